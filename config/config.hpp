@@ -1,0 +1,116 @@
+#pragma once
+
+// Everything that can be set, in sections as CONTRACT names them. Algorithm numbers are in kernels/params.hpp.
+
+#include <cstdint>
+#include <string>
+
+#include "kernels/params.hpp"
+
+namespace stillmap {
+
+/// Overrides of what the source says about itself; 0: not overridden.
+struct CameraConfig {
+  float fx = 0, fy = 0, cx = 0, cy = 0;
+  float k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;
+  float depth_units_per_m = 0;
+
+  template <class F>
+  static void fields(F&& f) {
+    using P = CameraConfig;
+    f("fx", &P::fx, 0, 1e5, "pixels", "Eq. (1)", "0: from the source");
+    f("fy", &P::fy, 0, 1e5, "pixels", "Eq. (1)", "0: from the source");
+    f("cx", &P::cx, 0, 1e5, "pixels", "Eq. (1)", "0: from the source");
+    f("cy", &P::cy, 0, 1e5, "pixels", "Eq. (1)", "0: from the source");
+    f("k1", &P::k1, -10, 10, "1", "ours", "Brown-Conrady, used with fx");
+    f("k2", &P::k2, -10, 10, "1", "ours", "Brown-Conrady, used with fx");
+    f("p1", &P::p1, -1, 1, "1", "ours", "Brown-Conrady, used with fx");
+    f("p2", &P::p2, -1, 1, "1", "ours", "Brown-Conrady, used with fx");
+    f("k3", &P::k3, -10, 10, "1", "ours", "Brown-Conrady, used with fx");
+    f("depth_units_per_m", &P::depth_units_per_m, 0, 1e6, "units/m", "ours", "0: from the source");
+  }
+};
+
+struct SourceConfig {
+  float wait_s = 0;
+  float time_offset_ms = 0;
+  float max_pair_ms = 20;
+
+  template <class F>
+  static void fields(F&& f) {
+    using P = SourceConfig;
+    f("wait_s", &P::wait_s, -1, 1e9, "s", "ours", "how long to wait for the source to appear; -1: for ever");
+    f("time_offset_ms", &P::time_offset_ms, -1e4, 1e4, "ms", "ours", "added to the colour stamp before pairing");
+    f("max_pair_ms", &P::max_pair_ms, 0, 1000, "ms", "ours", "largest distance of the stamps of a pair");
+  }
+};
+
+struct RecordConfig {
+  bool masks = false;
+  bool mesh = true;
+  bool map = false;
+  bool log = false;
+  int32_t snapshots = 8;
+  int32_t keep_previous = 3;
+
+  template <class F>
+  static void fields(F&& f) {
+    using P = RecordConfig;
+    f("masks", &P::masks, 0, 1, "bool", "III-C", "write masks/STAMP.png (and masks_truth/ where known)");
+    f("mesh", &P::mesh, 0, 1, "bool", "III-A", "write mesh.ply at the end");
+    f("map", &P::map, 0, 1, "bool", "ours", "write map.smap at the end");
+    f("log", &P::log, 0, 1, "bool", "ours", "write an LCM event log");
+    f("snapshots", &P::snapshots, 0, 1000, "frames", "Fig. 1", "frames kept with mask and reprojected map for `stillmap picture`");
+    f("keep_previous", &P::keep_previous, 0, 100, "runs", "ours", "earlier runs kept in DIR/previous-N");
+  }
+};
+
+struct RuntimeConfig {
+  int32_t threads = 2;
+
+  template <class F>
+  static void fields(F&& f) {
+    using P = RuntimeConfig;
+    f("threads", &P::threads, 1, 64, "threads", "ours", "of the CPU engine, the real-time thread included");
+  }
+};
+
+struct MemoryConfig {
+  int32_t budget_mb = 512;
+
+  template <class F>
+  static void fields(F&& f) {
+    using P = MemoryConfig;
+    f("budget_mb", &P::budget_mb, 1, 1000000, "MB", "ours", "a memory plan above it does not boot");
+  }
+};
+
+struct Config {
+  CameraConfig camera;
+  SourceConfig source;
+  DepthParams depth;
+  TrackParams track;
+  MaskParams mask;
+  IntegrateParams integrate;
+  MapParams map;
+  RecordConfig record;
+  RuntimeConfig runtime;
+  MemoryConfig memory;
+
+  /// Calls `f(section_name, pointer_to_section_member)` for each section, in the order of the files.
+  template <class F>
+  static void sections(F&& f) {
+    f("camera", &Config::camera);
+    f("source", &Config::source);
+    f("depth", &Config::depth);
+    f("track", &Config::track);
+    f("mask", &Config::mask);
+    f("integrate", &Config::integrate);
+    f("map", &Config::map);
+    f("record", &Config::record);
+    f("runtime", &Config::runtime);
+    f("memory", &Config::memory);
+  }
+};
+
+}  // namespace stillmap

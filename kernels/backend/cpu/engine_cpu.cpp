@@ -1,0 +1,2 @@
+// The CPU engine (see engine.hpp).
+#include "kernels/engine.hpp"

@@ -1,0 +1,138 @@
+#pragma once
+
+// The one interface of both engines (CPU now, CUDA later). Host code; only plain structs cross it.
+
+#include <cstdint>
+#include <memory>
+
+#include "kernels/base/pinhole.hpp"
+#include "kernels/base/se3.hpp"
+#include "kernels/base/status.hpp"
+#include "kernels/base/view.hpp"
+#include "kernels/params.hpp"
+
+namespace stillmap {
+
+/// All that an engine needs to be made.
+struct EngineParams {
+  CameraModel camera;               ///< of the colour image; depth is registered to it
+  float depth_units_per_m = 5000;   ///< raw depth units in a metre, > 0
+  DepthParams depth;
+  TrackParams track;
+  MaskParams mask;
+  IntegrateParams integrate;
+  MapParams map;
+  int32_t threads = 2;              ///< CPU engine: 1..64, the calling thread included
+};
+
+/// One line of the memory plan.
+struct MemoryItem {
+  const char* name;
+  uint64_t bytes;
+};
+inline constexpr uint32_t kMaxMemoryItems = 32;
+struct MemoryItems {
+  MemoryItem item[kMaxMemoryItems];
+  uint32_t count = 0;
+  uint64_t total_bytes = 0;
+};
+
+/// Raw frame: rows x cols of the camera model, row-major. Depth 0 and 65535 are invalid.
+struct FrameView {
+  ImageView<const uint16_t> depth_raw;
+  ImageView<const Rgb8> colour;
+};
+
+struct PrepareResult {
+  Status status = Status::ok;  ///< bad_data: wrong size or fewer valid pixels than depth.min_valid_pixels
+  int32_t valid_pixels = 0;
+};
+
+struct TrackResult {
+  Status status = Status::ok;  ///< degenerate: T_world_cam is the start pose
+  Se3 T_world_cam;
+  float covariance[21] = {};   ///< upper triangle, row by row; order x y z rx ry rz, left perturbation, m and rad
+  float inlier_ratio = 0;      ///< of the points that have a value in the map, share within track.inlier_m of its surface
+  float mapped_ratio = 0;      ///< of the valid unmasked pixels, share that has a value in the map
+  float rmse_m = 0;            ///< of the depth residuals of the points used
+  int32_t iterations = 0;
+};
+
+struct MaskResult {
+  Status status = Status::ok;
+  int32_t masked_pixels = 0;         ///< valid or not
+  int32_t masked_valid_pixels = 0;   ///< with a valid depth
+};
+
+/// Map counters since boot, read back once a frame.
+struct MapHealth {
+  uint32_t blocks = 0;        ///< in use
+  uint32_t capacity = 0;
+  uint32_t peak_blocks = 0;
+  uint64_t dropped_blocks = 0;  ///< far blocks given up because the pool was full
+  uint64_t contended = 0;       ///< insertions answered `contended`
+  uint64_t table_full = 0;      ///< insertions answered `table_full`
+  uint64_t pool_empty = 0;      ///< insertions answered `pool_empty`
+  uint64_t bytes = 0;         ///< peak bytes of blocks and their table entries
+};
+
+struct IntegrateResult {
+  Status status = Status::ok;  ///< capacity_exhausted: the map was full and something was not mapped; it is counted
+  MapHealth map;
+  uint32_t visible_blocks = 0;  ///< blocks looked at in this frame
+};
+
+/// Receives a mesh as it is extracted: first the counts, then all vertices in order, then all triangles.
+/// A false answer stops the extraction.
+class MeshSink {
+ public:
+  virtual ~MeshSink() = default;
+  virtual bool begin(uint64_t vertices, uint64_t triangles) = 0;
+  /// @param positions_m map frame; @param colours as many as positions
+  virtual bool vertices(View<const Vec3> positions_m, View<const Rgb8> colours) = 0;
+  /// @param indices three a triangle, counter-clockwise seen from free space
+  virtual bool triangles(View<const uint32_t> indices) = 0;
+};
+
+/// One frame is prepare, track, mask, track again with the mask (paper: refine), integrate; in this order.
+/// @thread one thread at a time; after make_* no call allocates or throws
+class Engine {
+ public:
+  virtual ~Engine() = default;
+
+  /// Metres, range gate, undistortion, intensity. The views need to live until the call returns.
+  virtual PrepareResult prepare(const FrameView& frame) = 0;
+  /// First registration (paper III-B), all pixels.
+  virtual TrackResult track(const Se3& T_world_cam_start) = 0;
+  /// Dynamic pixels from the residuals at this pose (paper III-C). Replaces the mask of the last frame.
+  virtual MaskResult mask(const Se3& T_world_cam) = 0;
+  /// Second registration, masked pixels excluded (paper III-C).
+  virtual TrackResult refine(const Se3& T_world_cam_start) = 0;
+  /// Allocates on unmasked rays, fuses, carves (paper III-A, III-D).
+  virtual IntegrateResult integrate(const Se3& T_world_cam) = 0;
+
+  /// The map seen from any pose: depth in metres (0: nothing) and colour; both images of the size of `k`.
+  virtual Status raycast(const Se3& T_world_cam, const Intrinsics& k, ImageView<float> depth_m,
+                         ImageView<Rgb8> colour) = 0;
+  /// Welded coloured mesh of the zero level, same bytes for the same map.
+  virtual Status extract_mesh(MeshSink& sink) = 0;
+
+  /// 255: dynamic. Size of the camera; valid until the next `prepare`.
+  virtual ImageView<const uint8_t> mask_image() const = 0;
+  /// Undistorted depth in metres (0: invalid) of the last prepared frame; may exceed depth.max_m.
+  virtual ImageView<const float> depth_image_m() const = 0;
+  /// Undistorted colour of the last prepared frame.
+  virtual ImageView<const Rgb8> colour_image() const = 0;
+  virtual MapHealth map_health() const = 0;
+  /// Forgets the map; memory stays.
+  virtual void reset_map() = 0;
+};
+
+/// What make_cpu_engine would take, item by item. Same code as the one that carves, so it cannot differ.
+MemoryItems plan_cpu_engine(const EngineParams& params);
+
+/// Allocates everything, starts the workers.
+/// @return null when the memory cannot be had.  @thread boot
+std::unique_ptr<Engine> make_cpu_engine(const EngineParams& params);
+
+}  // namespace stillmap

@@ -1,0 +1,62 @@
+#pragma once
+
+// What a camera or a recording looks like to the runtime; drivers implement it.
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "kernels/base/pinhole.hpp"
+#include "kernels/base/se3.hpp"
+#include "kernels/base/status.hpp"
+#include "kernels/base/view.hpp"
+
+namespace stillmap {
+
+/// Nanoseconds; of the source's own clock for recordings.
+struct Stamp {
+  int64_t ns = 0;
+
+  double seconds() const { return static_cast<double>(ns) * 1e-9; }
+  friend auto operator<=>(const Stamp&, const Stamp&) = default;
+};
+
+/// Memory of one frame, allocated by its owner with the size of SourceInfo; a source fills it.
+struct RgbdFrame {
+  Stamp depth_stamp;                      ///< capture of the depth image
+  Stamp colour_stamp;
+  uint32_t sequence = 0;                  ///< index in the source, skipped and bad frames counted
+  ImageView<uint16_t> depth_raw;          ///< 0 and 65535: invalid
+  ImageView<Rgb8> colour;
+  ImageView<uint8_t> truth_mask;          ///< 255: truly dynamic; only when SourceInfo::has_truth_mask, else no data
+  std::optional<Se3d> truth_T_world_cam;  ///< source's world; only where the source knows it
+};
+
+struct SourceInfo {
+  std::string name;                ///< as given, for reports: "tum:DIR"
+  CameraModel camera;
+  float depth_units_per_m = 5000;
+  int64_t frames = -1;             ///< number of frames, -1: unknown (live)
+  bool has_truth_mask = false;
+};
+
+/// @thread open: boot; next: one reader thread
+class FrameSource {
+ public:
+  virtual ~FrameSource() = default;
+
+  virtual const SourceInfo& info() const = 0;
+
+  /// Fills `frame`, waiting at most `timeout_ms` (recordings do not wait).
+  /// @return ok; end; timeout; bad_data: this frame is unusable and was passed over, `error()` says which file and why;
+  ///         unavailable: the source is gone
+  virtual Status next(RgbdFrame& frame, int32_t timeout_ms) = 0;
+
+  /// Passes over `count` frames without decoding them.
+  virtual void skip(uint32_t count) = 0;
+
+  /// One line: which file, what was expected, what to do.
+  virtual const std::string& error() const = 0;
+};
+
+}  // namespace stillmap

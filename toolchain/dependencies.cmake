@@ -1,0 +1,19 @@
+# Third-party parts, all from the distribution's packages (toolchain/setup.sh installs them).
+find_package(Threads REQUIRED)
+find_package(PkgConfig REQUIRED)
+find_package(Eigen3 3.3 REQUIRED NO_MODULE)
+find_package(fmt REQUIRED)
+find_package(CLI11 REQUIRED)
+find_package(nlohmann_json REQUIRED)
+find_package(nanoflann REQUIRED)
+pkg_check_modules(spng REQUIRED IMPORTED_TARGET spng)
+pkg_check_modules(turbojpeg REQUIRED IMPORTED_TARGET libturbojpeg)
+pkg_check_modules(cairo REQUIRED IMPORTED_TARGET cairo)
+find_path(TOMLPLUSPLUS_INCLUDE_DIR toml++/toml.h REQUIRED)
+add_library(stillmap_tomlplusplus INTERFACE)
+target_include_directories(stillmap_tomlplusplus SYSTEM INTERFACE ${TOMLPLUSPLUS_INCLUDE_DIR})
+
+# What every library and program of the project is compiled with.
+add_library(stillmap_common INTERFACE)
+target_include_directories(stillmap_common INTERFACE ${CMAKE_SOURCE_DIR})
+target_link_libraries(stillmap_common INTERFACE stillmap_warnings stillmap_sanitize)
