@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "kernels/base/pinhole.hpp"
 #include "kernels/base/se3.hpp"
@@ -51,6 +52,10 @@ class FrameSource {
   /// @return ok; end; timeout; bad_data: this frame is unusable and was passed over, `error()` says which file and why;
   ///         unavailable: the source is gone
   virtual Status next(RgbdFrame& frame, int32_t timeout_ms) = 0;
+
+  /// Points of the true static surface (as it is at the end), source's world, metres; empty where unknown.
+  /// @thread boot
+  virtual std::vector<Vec3> truth_cloud() const { return {}; }
 
   /// Passes over `count` frames without decoding them.
   virtual void skip(uint32_t count) = 0;

@@ -1,0 +1,21 @@
+#pragma once
+
+#include "config/config.hpp"
+#include "kernels/engine.hpp"
+
+namespace stillmap {
+
+/// What the engine needs, from the configuration and from what the source says of its camera.
+/// config.camera, where set, wins over the source.
+inline EngineParams engine_params(const Config& config, CameraModel camera, float depth_units_per_m) {
+  const CameraConfig& c = config.camera;
+  if (c.fx > 0) {
+    camera.k = {c.fx, c.fy, c.cx, c.cy, camera.k.width, camera.k.height};
+    camera.distortion = {c.k1, c.k2, c.p1, c.p2, c.k3};
+  }
+  if (c.depth_units_per_m > 0) depth_units_per_m = c.depth_units_per_m;
+  return {camera,      depth_units_per_m, config.depth, config.track,
+          config.mask, config.integrate,  config.map,   config.runtime.threads};
+}
+
+}  // namespace stillmap

@@ -1,0 +1,70 @@
+#pragma once
+
+// One frame after the other, in the order of the paper: prepare, track, mask, refine, integrate.
+
+#include <cstdint>
+
+#include "config/config.hpp"
+#include "kernels/engine.hpp"
+#include "runtime/ports/frame_source.hpp"
+
+namespace stillmap {
+
+enum class TrackingState : uint8_t { good, poor, lost };
+const char* to_string(TrackingState state);
+
+/// Wall time of the steps of one frame. `total`: frame ready to result ready, decoding excluded.
+struct StageTimes {
+  float prepare_ms = 0, track_ms = 0, mask_ms = 0, refine_ms = 0, integrate_ms = 0, total_ms = 0;
+};
+
+/// What is known after a frame. Plain data: it goes through queues later.
+struct FrameResult {
+  Stamp stamp;                  ///< depth capture
+  uint32_t sequence = 0;
+  Status status = Status::ok;   ///< bad_data: frame not used (too few valid pixels); pose and map unchanged
+  TrackingState state = TrackingState::good;
+  float p_good = 0;             ///< probability that the pose is good, 0..1
+  float inlier_ratio = 0;
+  float masked_fraction = 0;    ///< masked pixels over all pixels
+  Se3d T_map_cam;               ///< predicted pose while lost
+  float covariance[21] = {};    ///< upper triangle, x y z rx ry rz, left perturbation
+  StageTimes ms;
+  MapHealth map;
+};
+
+/// Counters over the run.
+struct PipelineCounters {
+  uint32_t frames = 0;       ///< processed, bad ones included
+  uint32_t bad_frames = 0;
+  uint32_t lost_frames = 0;
+  uint32_t relocalised = 0;  ///< returns from lost
+};
+
+/// @thread real-time thread; `process` does not allocate, lock, touch files or throw
+class Pipeline {
+ public:
+  /// @param T_map_cam pose of the first frame (identity unless --initial-pose)
+  Pipeline(Engine& engine, const Config& config, const Se3d& T_map_cam = {});
+
+  FrameResult process(const RgbdFrame& frame);
+
+  const PipelineCounters& counters() const { return counters_; }
+
+ private:
+  FrameResult track_and_map(FrameResult result);
+  Se3d predicted(Stamp stamp) const;
+  void remember(const FrameResult& result);
+
+  Engine& engine_;
+  Config config_;
+  PipelineCounters counters_;
+  Se3d T_map_cam_;             ///< last pose
+  Se3d T_map_cam_before_;      ///< the pose before it
+  Stamp stamp_, stamp_before_;
+  bool have_map_ = false;
+  bool have_motion_ = false;
+  bool lost_ = false;
+};
+
+}  // namespace stillmap
