@@ -1,6 +1,7 @@
 #pragma once
 
-// Everything that can be set, in sections as CONTRACT names them. Algorithm numbers are in kernels/params.hpp.
+// Everything that can be set, in sections as CONTRACT names them. Algorithm numbers are in
+// kernels/params.hpp.
 
 #include <cstdint>
 #include <string>
@@ -40,7 +41,8 @@ struct SourceConfig {
   static void fields(F&& f) {
     using P = SourceConfig;
     f("wait_s", &P::wait_s, -1, 1e9, "s", "ours", "how long to wait for the source to appear; -1: for ever");
-    f("time_offset_ms", &P::time_offset_ms, -1e4, 1e4, "ms", "ours", "added to the colour stamp before pairing");
+    f("time_offset_ms", &P::time_offset_ms, -1e4, 1e4, "ms", "ours",
+      "added to the colour stamp before pairing");
     f("max_pair_ms", &P::max_pair_ms, 0, 1000, "ms", "ours", "largest distance of the stamps of a pair");
   }
 };
@@ -60,7 +62,8 @@ struct RecordConfig {
     f("mesh", &P::mesh, 0, 1, "bool", "III-A", "write mesh.ply at the end");
     f("map", &P::map, 0, 1, "bool", "ours", "write map.smap at the end");
     f("log", &P::log, 0, 1, "bool", "ours", "write an LCM event log");
-    f("snapshots", &P::snapshots, 0, 1000, "frames", "Fig. 1", "frames kept with mask and reprojected map for `stillmap picture`");
+    f("snapshots", &P::snapshots, 0, 1000, "frames", "Fig. 1",
+      "frames kept with mask and reprojected map for `stillmap picture`");
     f("keep_previous", &P::keep_previous, 0, 100, "runs", "ours", "earlier runs kept in DIR/previous-N");
   }
 };

@@ -15,14 +15,14 @@ namespace stillmap {
 
 /// All that an engine needs to be made.
 struct EngineParams {
-  CameraModel camera;               ///< of the colour image; depth is registered to it
-  float depth_units_per_m = 5000;   ///< raw depth units in a metre, > 0
+  CameraModel camera;              ///< of the colour image; depth is registered to it
+  float depth_units_per_m = 5000;  ///< raw depth units in a metre, > 0
   DepthParams depth;
   TrackParams track;
   MaskParams mask;
   IntegrateParams integrate;
   MapParams map;
-  int32_t threads = 2;              ///< CPU engine: 1..64, the calling thread included
+  int32_t threads = 2;  ///< CPU engine: 1..64, the calling thread included
 };
 
 /// One line of the memory plan.
@@ -51,33 +51,36 @@ struct PrepareResult {
 struct TrackResult {
   Status status = Status::ok;  ///< degenerate: T_world_cam is the start pose
   Se3 T_world_cam;
-  float covariance[21] = {};   ///< upper triangle, row by row; order x y z rx ry rz, left perturbation, m and rad
-  float inlier_ratio = 0;      ///< of the points that have a value in the map, share within track.inlier_m of its surface
-  float mapped_ratio = 0;      ///< of the valid unmasked pixels, share that has a value in the map
-  float rmse_m = 0;            ///< of the depth residuals of the points used
+  float covariance[21] =
+      {};  ///< upper triangle, row by row; order x y z rx ry rz, left perturbation, m and rad
+  float inlier_ratio =
+      0;  ///< of the points that have a value in the map, share within track.inlier_m of its surface
+  float mapped_ratio = 0;  ///< of the valid unmasked pixels, share that has a value in the map
+  float rmse_m = 0;        ///< of the depth residuals of the points used
   int32_t iterations = 0;
 };
 
 struct MaskResult {
   Status status = Status::ok;
-  int32_t masked_pixels = 0;         ///< valid or not
-  int32_t masked_valid_pixels = 0;   ///< with a valid depth
+  int32_t masked_pixels = 0;        ///< valid or not
+  int32_t masked_valid_pixels = 0;  ///< with a valid depth
 };
 
 /// Map counters since boot, read back once a frame.
 struct MapHealth {
-  uint32_t blocks = 0;        ///< in use
+  uint32_t blocks = 0;  ///< in use
   uint32_t capacity = 0;
   uint32_t peak_blocks = 0;
   uint64_t dropped_blocks = 0;  ///< far blocks given up because the pool was full
   uint64_t contended = 0;       ///< insertions answered `contended`
   uint64_t table_full = 0;      ///< insertions answered `table_full`
   uint64_t pool_empty = 0;      ///< insertions answered `pool_empty`
-  uint64_t bytes = 0;         ///< peak bytes of blocks and their table entries
+  uint64_t bytes = 0;           ///< peak bytes of blocks and their table entries
 };
 
 struct IntegrateResult {
-  Status status = Status::ok;  ///< capacity_exhausted: the map was full and something was not mapped; it is counted
+  Status status =
+      Status::ok;  ///< capacity_exhausted: the map was full and something was not mapped; it is counted
   MapHealth map;
   uint32_t visible_blocks = 0;  ///< blocks looked at in this frame
 };

@@ -1,7 +1,8 @@
 #pragma once
 
-// Every number of the method: default, unit, range, where the paper says it. The only place with such defaults.
-// "ours" marks what the paper leaves open. config/ reads the `fields` lists to load, check, describe and write presets.
+// Every number of the method: default, unit, range, where the paper says it. The only place with such
+// defaults. "ours" marks what the paper leaves open. config/ reads the `fields` lists to load, check,
+// describe and write presets.
 
 #include <cstdint>
 
@@ -23,9 +24,12 @@ struct DepthParams {
   static void fields(F&& f) {
     using P = DepthParams;
     f("min_m", &P::min_m, 0.01, 10.0, "m", "ours", "nearer measurements are invalid");
-    f("max_m", &P::max_m, 0.1, 20.0, "m", "ours", "farther measurements only make free space, up to integrate.free_max_m");
-    f("invalid", &P::invalid, 0, 1, "ignore|complete", "III-E", "zeros are ignored, or filled from a temporary model");
-    f("complete_frames", &P::complete_frames, 2, 60, "frames", "III-E, IV-A", "frames of the temporary model");
+    f("max_m", &P::max_m, 0.1, 20.0, "m", "ours",
+      "farther measurements only make free space, up to integrate.free_max_m");
+    f("invalid", &P::invalid, 0, 1, "ignore|complete", "III-E",
+      "zeros are ignored, or filled from a temporary model");
+    f("complete_frames", &P::complete_frames, 2, 60, "frames", "III-E, IV-A",
+      "frames of the temporary model");
     f("min_valid_pixels", &P::min_valid_pixels, 10, 1e7, "pixels of 640x480", "ours",
       "with fewer (scaled to the image size) a frame neither moves the pose nor touches the map");
   }
@@ -52,21 +56,27 @@ struct TrackParams {
   template <class F>
   static void fields(F&& f) {
     using P = TrackParams;
-    f("colour_weight", &P::colour_weight, 0, 10.0, "1", "Tab. I, Eq. (4)", "w_c, weight of the intensity error (0..1 scale)");
-    f("huber_depth_m", &P::huber_depth_m, 0, 1.0, "m", "ours", "Huber threshold on the depth residual; 0: squared error everywhere");
+    f("colour_weight", &P::colour_weight, 0, 10.0, "1", "Tab. I, Eq. (4)",
+      "w_c, weight of the intensity error (0..1 scale)");
+    f("huber_depth_m", &P::huber_depth_m, 0, 1.0, "m", "ours",
+      "Huber threshold on the depth residual; 0: squared error everywhere");
     f("levels", &P::levels, 1, 3, "levels", "III-B", "coarse-to-fine sub-samplings, finest is every pixel");
     f("iterations_coarse", &P::iterations_coarse, 0, 100, "iterations", "ours", "at most, every 4th pixel");
     f("iterations_middle", &P::iterations_middle, 0, 100, "iterations", "ours", "at most, every 2nd pixel");
     f("iterations_fine", &P::iterations_fine, 0, 100, "iterations", "ours", "at most, every pixel");
-    f("damping_initial", &P::damping_initial, 0, 1e3, "1", "ours", "Levenberg-Marquardt damping, relative to the diagonal");
+    f("damping_initial", &P::damping_initial, 0, 1e3, "1", "ours",
+      "Levenberg-Marquardt damping, relative to the diagonal");
     f("damping_up", &P::damping_up, 1.0, 1e3, "1", "ours", "factor after a rejected step");
     f("damping_down", &P::damping_down, 1e-3, 1.0, "1", "ours", "factor after an accepted step");
-    f("converged_m", &P::converged_m, 0, 0.1, "m", "ours", "a level ends when a step translates and rotates less");
+    f("converged_m", &P::converged_m, 0, 0.1, "m", "ours",
+      "a level ends when a step translates and rotates less");
     f("converged_rad", &P::converged_rad, 0, 0.1, "rad", "ours", "see converged_m");
     f("prior", &P::prior, 0, 1, "last_pose|constant_velocity", "ours", "where the registration starts");
-    f("lost_inlier_ratio", &P::lost_inlier_ratio, 0, 1.0, "1", "ours", "lost below this share of points within inlier_m of the map");
+    f("lost_inlier_ratio", &P::lost_inlier_ratio, 0, 1.0, "1", "ours",
+      "lost below this share of points within inlier_m of the map");
     f("poor_inlier_ratio", &P::poor_inlier_ratio, 0, 1.0, "1", "ours", "poor below this share");
-    f("inlier_m", &P::inlier_m, 1e-3, 1.0, "m", "ours", "a point this near to the mapped surface is an inlier");
+    f("inlier_m", &P::inlier_m, 1e-3, 1.0, "m", "ours",
+      "a point this near to the mapped surface is an inlier");
   }
 };
 
@@ -83,9 +93,12 @@ struct MaskParams {
     using P = MaskParams;
     f("enabled", &P::enabled, 0, 1, "bool", "III-C", "false: everything is taken as static");
     f("gamma", &P::gamma, 0, 1.0, "1", "Tab. I, Eq. (5)", "a squared residual above gamma tau^2 is suspect");
-    f("flood_depth_ratio", &P::flood_depth_ratio, 0, 0.1, "1", "Tab. I, Alg. 1", "theta, depth step to a neighbour over depth");
-    f("erode_px", &P::erode_px, 0, 32, "pixels of 640 columns", "ours", "radius of the square erosion of the raw mask");
-    f("dilate_px", &P::dilate_px, 0, 32, "pixels of 640 columns", "ours", "radius of the square dilation after the flood fill");
+    f("flood_depth_ratio", &P::flood_depth_ratio, 0, 0.1, "1", "Tab. I, Alg. 1",
+      "theta, depth step to a neighbour over depth");
+    f("erode_px", &P::erode_px, 0, 32, "pixels of 640 columns", "ours",
+      "radius of the square erosion of the raw mask");
+    f("dilate_px", &P::dilate_px, 0, 32, "pixels of 640 columns", "ours",
+      "radius of the square dilation after the flood fill");
   }
 };
 
@@ -116,8 +129,10 @@ struct MapParams {
     using P = MapParams;
     f("voxel_m", &P::voxel_m, 1e-3, 0.5, "m", "Tab. I", "edge of a voxel");
     f("truncation_m", &P::truncation_m, 4e-3, 2.0, "m", "Tab. I", "tau; at least 4 voxels");
-    f("pool_blocks", &P::pool_blocks, 1, 4000000, "blocks of 4 kB", "ours", "fixed at boot; the hash table has twice as many slots or more");
-    f("high_water", &P::high_water, 0.1, 1.0, "share", "ours", "above this fill the blocks farthest from the camera are dropped");
+    f("pool_blocks", &P::pool_blocks, 1, 4000000, "blocks of 4 kB", "ours",
+      "fixed at boot; the hash table has twice as many slots or more");
+    f("high_water", &P::high_water, 0.1, 1.0, "share", "ours",
+      "above this fill the blocks farthest from the camera are dropped");
   }
 };
 

@@ -152,7 +152,8 @@ STILLMAP_HD Mat3T<T> rotation_from(const QuatT<T>& q) {
   const T xx = s * q.x * q.x, yy = s * q.y * q.y, zz = s * q.z * q.z;
   const T xy = s * q.x * q.y, xz = s * q.x * q.z, yz = s * q.y * q.z;
   const T wx = s * q.w * q.x, wy = s * q.w * q.y, wz = s * q.w * q.z;
-  return {{T(1) - yy - zz, xy - wz, xz + wy, xy + wz, T(1) - xx - zz, yz - wx, xz - wy, yz + wx, T(1) - xx - yy}};
+  return {
+      {T(1) - yy - zz, xy - wz, xz + wy, xy + wz, T(1) - xx - zz, yz - wx, xz - wy, yz + wx, T(1) - xx - yy}};
 }
 
 /// @return unit quaternion with w >= 0.                                 test: se3_test

@@ -19,14 +19,22 @@ enum class Status : uint8_t {
 /// @return a short lower-case name for messages.  @thread any
 constexpr const char* to_string(Status s) {
   switch (s) {
-    case Status::ok: return "ok";
-    case Status::end: return "end";
-    case Status::timeout: return "timeout";
-    case Status::bad_data: return "bad data";
-    case Status::capacity_exhausted: return "capacity exhausted";
-    case Status::degenerate: return "degenerate";
-    case Status::unavailable: return "unavailable";
-    case Status::out_of_range: return "out of range";
+    case Status::ok:
+      return "ok";
+    case Status::end:
+      return "end";
+    case Status::timeout:
+      return "timeout";
+    case Status::bad_data:
+      return "bad data";
+    case Status::capacity_exhausted:
+      return "capacity exhausted";
+    case Status::degenerate:
+      return "degenerate";
+    case Status::unavailable:
+      return "unavailable";
+    case Status::out_of_range:
+      return "out of range";
   }
   return "unknown";
 }

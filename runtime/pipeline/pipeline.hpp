@@ -20,22 +20,22 @@ struct StageTimes {
 
 /// What is known after a frame. Plain data: it goes through queues later.
 struct FrameResult {
-  Stamp stamp;                  ///< depth capture
+  Stamp stamp;  ///< depth capture
   uint32_t sequence = 0;
-  Status status = Status::ok;   ///< bad_data: frame not used (too few valid pixels); pose and map unchanged
+  Status status = Status::ok;  ///< bad_data: frame not used (too few valid pixels); pose and map unchanged
   TrackingState state = TrackingState::good;
-  float p_good = 0;             ///< probability that the pose is good, 0..1
+  float p_good = 0;  ///< probability that the pose is good, 0..1
   float inlier_ratio = 0;
-  float masked_fraction = 0;    ///< masked pixels over all pixels
-  Se3d T_map_cam;               ///< predicted pose while lost
-  float covariance[21] = {};    ///< upper triangle, x y z rx ry rz, left perturbation
+  float masked_fraction = 0;  ///< masked pixels over all pixels
+  Se3d T_map_cam;             ///< predicted pose while lost
+  float covariance[21] = {};  ///< upper triangle, x y z rx ry rz, left perturbation
   StageTimes ms;
   MapHealth map;
 };
 
 /// Counters over the run.
 struct PipelineCounters {
-  uint32_t frames = 0;       ///< processed, bad ones included
+  uint32_t frames = 0;  ///< processed, bad ones included
   uint32_t bad_frames = 0;
   uint32_t lost_frames = 0;
   uint32_t relocalised = 0;  ///< returns from lost
@@ -59,8 +59,8 @@ class Pipeline {
   Engine& engine_;
   Config config_;
   PipelineCounters counters_;
-  Se3d T_map_cam_;             ///< last pose
-  Se3d T_map_cam_before_;      ///< the pose before it
+  Se3d T_map_cam_;         ///< last pose
+  Se3d T_map_cam_before_;  ///< the pose before it
   Stamp stamp_, stamp_before_;
   bool have_map_ = false;
   bool have_motion_ = false;

@@ -24,20 +24,20 @@ struct Stamp {
 
 /// Memory of one frame, allocated by its owner with the size of SourceInfo; a source fills it.
 struct RgbdFrame {
-  Stamp depth_stamp;                      ///< capture of the depth image
+  Stamp depth_stamp;  ///< capture of the depth image
   Stamp colour_stamp;
-  uint32_t sequence = 0;                  ///< index in the source, skipped and bad frames counted
-  ImageView<uint16_t> depth_raw;          ///< 0 and 65535: invalid
+  uint32_t sequence = 0;          ///< index in the source, skipped and bad frames counted
+  ImageView<uint16_t> depth_raw;  ///< 0 and 65535: invalid
   ImageView<Rgb8> colour;
-  ImageView<uint8_t> truth_mask;          ///< 255: truly dynamic; only when SourceInfo::has_truth_mask, else no data
+  ImageView<uint8_t> truth_mask;  ///< 255: truly dynamic; only when SourceInfo::has_truth_mask, else no data
   std::optional<Se3d> truth_T_world_cam;  ///< source's world; only where the source knows it
 };
 
 struct SourceInfo {
-  std::string name;                ///< as given, for reports: "tum:DIR"
+  std::string name;  ///< as given, for reports: "tum:DIR"
   CameraModel camera;
   float depth_units_per_m = 5000;
-  int64_t frames = -1;             ///< number of frames, -1: unknown (live)
+  int64_t frames = -1;  ///< number of frames, -1: unknown (live)
   bool has_truth_mask = false;
 };
 
@@ -49,7 +49,8 @@ class FrameSource {
   virtual const SourceInfo& info() const = 0;
 
   /// Fills `frame`, waiting at most `timeout_ms` (recordings do not wait).
-  /// @return ok; end; timeout; bad_data: this frame is unusable and was passed over, `error()` says which file and why;
+  /// @return ok; end; timeout; bad_data: this frame is unusable and was passed over, `error()` says which
+  /// file and why;
   ///         unavailable: the source is gone
   virtual Status next(RgbdFrame& frame, int32_t timeout_ms) = 0;
 

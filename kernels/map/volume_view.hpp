@@ -1,0 +1,103 @@
+#pragma once
+
+#include <cstdint>
+
+#include "kernels/map/hash_view.hpp"
+#include "kernels/map/voxel.hpp"
+
+namespace stillmap {
+
+/// The map as kernels see it: table, pool, voxels. Map frame, metres.
+struct VolumeView {
+  HashView table;
+  PoolView pool;
+  View<VoxelBlock> blocks;    ///< by BlockId
+  View<BlockKey> block_keys;  ///< by BlockId; kEmptyKey: not in use
+  float voxel_m = 0.01f;
+  float truncation_m = 0.1f;
+
+  STILLMAP_HD float sdf_unit_m() const { return truncation_m / static_cast<float>(kSdfMax); }
+};
+
+/// Last block that was looked up; neighbouring pixels mostly fall into the same one.
+struct BlockCache {
+  BlockKey key = kEmptyKey;
+  const VoxelBlock* block = nullptr;  ///< null: there is none
+};
+
+/// @return the block of `key`, null when it is not in the map.
+STILLMAP_HD const VoxelBlock* lookup(const VolumeView& map, BlockKey key, BlockCache& cache) {
+  if (key != cache.key) {
+    const BlockId id = map.table.find(key);
+    cache = {key, id == kNoBlock ? nullptr : &map.blocks[id]};
+  }
+  return cache.block;
+}
+
+/// The eight voxels about a point, x fastest: 000 100 010 110 001 101 011 111, and where the point lies
+/// between them.
+struct Corners {
+  VoxelSurface voxel[8];
+  Vec3 fraction;  ///< 0..1 along each axis
+};
+
+/// Reads the voxels around `p_map`.                                       test: volume_test
+/// @return false when one of them was never observed; `out` is then of no meaning
+STILLMAP_HD bool read_corners(const VolumeView& map, Vec3 p_map, BlockCache& cache, Corners& out) {
+  const float inv = 1.0f / map.voxel_m;
+  const float gx = p_map.x * inv, gy = p_map.y * inv, gz = p_map.z * inv;
+  const float fx = floorf(gx), fy = floorf(gy), fz = floorf(gz);
+  out.fraction = {gx - fx, gy - fy, gz - fz};
+  const Int3 base = {static_cast<int32_t>(fx), static_cast<int32_t>(fy), static_cast<int32_t>(fz)};
+  const Int3 local = {base.x & 7, base.y & 7, base.z & 7};
+  if (local.x < 7 && local.y < 7 && local.z < 7) {
+    const VoxelBlock* block = lookup(map, pack(block_of_voxel(base)), cache);
+    if (!block) return false;
+    const VoxelSurface* v = block->surface + voxel_index(local.x, local.y, local.z);
+    constexpr int32_t y = kBlockEdge, z = kBlockEdge * kBlockEdge;
+    out.voxel[0] = v[0], out.voxel[1] = v[1], out.voxel[2] = v[y], out.voxel[3] = v[y + 1];
+    out.voxel[4] = v[z], out.voxel[5] = v[z + 1], out.voxel[6] = v[z + y], out.voxel[7] = v[z + y + 1];
+  } else {
+    for (int32_t i = 0; i < 8; ++i) {
+      const Int3 voxel = {base.x + (i & 1), base.y + (i >> 1 & 1), base.z + (i >> 2)};
+      const VoxelBlock* block = lookup(map, pack(block_of_voxel(voxel)), cache);
+      if (!block) return false;
+      out.voxel[i] = block->surface[index_in_block(voxel)];
+    }
+  }
+  bool observed = true;
+  for (const VoxelSurface& v : out.voxel) observed &= v.sdf != kSdfUnobserved;
+  return observed;
+}
+
+/// Trilinear mean of eight corner values.
+STILLMAP_HD float trilinear(const float c[8], Vec3 f) {
+  const float x00 = c[0] + f.x * (c[1] - c[0]), x10 = c[2] + f.x * (c[3] - c[2]);
+  const float x01 = c[4] + f.x * (c[5] - c[4]), x11 = c[6] + f.x * (c[7] - c[6]);
+  const float y0 = x00 + f.y * (x10 - x00), y1 = x01 + f.y * (x11 - x01);
+  return y0 + f.z * (y1 - y0);
+}
+
+/// Its gradient by the three fractions (analytic, of the same eight values).   test: volume_test
+STILLMAP_HD Vec3 trilinear_gradient(const float c[8], Vec3 f) {
+  const float dx00 = c[1] - c[0], dx10 = c[3] - c[2], dx01 = c[5] - c[4], dx11 = c[7] - c[6];
+  const float dx0 = dx00 + f.y * (dx10 - dx00), dx1 = dx01 + f.y * (dx11 - dx01);
+  const float x00 = c[0] + f.x * dx00, x10 = c[2] + f.x * dx10, x01 = c[4] + f.x * dx01,
+              x11 = c[6] + f.x * dx11;
+  const float dy0 = x10 - x00, dy1 = x11 - x01;
+  const float y0 = x00 + f.y * dy0, y1 = x01 + f.y * dy1;
+  return {dx0 + f.z * (dx1 - dx0), dy0 + f.z * (dy1 - dy0), y1 - y0};
+}
+
+/// V_SDF at a point, metres (paper section III-B).                        test: volume_test
+/// @return false when a neighbouring voxel is unobserved
+STILLMAP_HD bool sample_sdf(const VolumeView& map, Vec3 p_map, BlockCache& cache, float& sdf_m) {
+  Corners corners;
+  if (!read_corners(map, p_map, cache, corners)) return false;
+  float sdf[8];
+  for (int32_t i = 0; i < 8; ++i) sdf[i] = static_cast<float>(corners.voxel[i].sdf);
+  sdf_m = trilinear(sdf, corners.fraction) * map.sdf_unit_m();
+  return true;
+}
+
+}  // namespace stillmap
