@@ -1,1 +1,0 @@
-// PLY files.
