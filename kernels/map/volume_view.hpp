@@ -11,8 +11,10 @@ namespace stillmap {
 struct VolumeView {
   HashView table;
   PoolView pool;
-  View<VoxelBlock> blocks;    ///< by BlockId
-  View<BlockKey> block_keys;  ///< by BlockId; kEmptyKey: not in use
+  View<VoxelBlock> blocks;     ///< by BlockId
+  View<BlockKey> block_keys;   ///< by BlockId; kEmptyKey: not in use
+  View<uint8_t> settled_free;  ///< by BlockId; 1: every voxel is free with full weight, seeing it free again
+                               ///< changes nothing
   float voxel_m = 0.01f;
   float truncation_m = 0.1f;
 

@@ -1,1 +1,140 @@
-// One frame.
+#include "runtime/pipeline/pipeline.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+namespace stillmap {
+namespace {
+
+/// Adds up the wall time of consecutive steps.
+class StopWatch {
+ public:
+  /// Milliseconds since the last call, or since it was made.
+  float lap_ms() {
+    const auto now = Clock::now();
+    const float ms = std::chrono::duration<float, std::milli>(now - last_).count();
+    last_ = now;
+    return ms;
+  }
+  float total_ms() const { return std::chrono::duration<float, std::milli>(Clock::now() - start_).count(); }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point start_ = Clock::now(), last_ = start_;
+};
+
+/// Share of inliers between `lost` and all, as a probability: 0 at the lost threshold, 1 at twice the poor
+/// one.
+float probability_good(float inlier_ratio, const TrackParams& p) {
+  const float full = std::min(1.0f, 2.0f * p.poor_inlier_ratio);
+  return std::clamp((inlier_ratio - p.lost_inlier_ratio) / std::max(full - p.lost_inlier_ratio, 1e-3f), 0.0f,
+                    1.0f);
+}
+
+TrackingState state_of(const TrackResult& track, const TrackParams& p) {
+  if (track.status != Status::ok || track.inlier_ratio < p.lost_inlier_ratio) return TrackingState::lost;
+  return track.inlier_ratio < p.poor_inlier_ratio ? TrackingState::poor : TrackingState::good;
+}
+
+}  // namespace
+
+const char* to_string(TrackingState state) {
+  switch (state) {
+    case TrackingState::good:
+      return "good";
+    case TrackingState::poor:
+      return "poor";
+    case TrackingState::lost:
+      return "lost";
+  }
+  return "unknown";
+}
+
+Pipeline::Pipeline(Engine& engine, const Config& config, const Se3d& T_map_cam)
+    : engine_(engine), config_(config), T_map_cam_(T_map_cam), T_map_cam_before_(T_map_cam) {}
+
+FrameResult Pipeline::process(const RgbdFrame& frame) {
+  StopWatch total, watch;
+  FrameResult result;
+  result.stamp = frame.depth_stamp;
+  result.sequence = frame.sequence;
+  result.T_map_cam = T_map_cam_;
+  result.state = lost_ ? TrackingState::lost : TrackingState::good;
+
+  const PrepareResult prepared = engine_.prepare({frame.depth_raw, frame.colour});
+  result.status = prepared.status;
+  result.ms.prepare_ms = watch.lap_ms();
+  if (prepared.status == Status::ok) result = have_map_ ? track_and_map(result) : start_map(result);
+  result.map = engine_.map_health();
+  result.ms.total_ms = total.total_ms();
+  remember(result);
+  return result;
+}
+
+/// The first frame is the map: it is taken as static.
+FrameResult Pipeline::start_map(FrameResult result) {
+  StopWatch watch;
+  engine_.integrate(cast<float>(result.T_map_cam));
+  result.p_good = 1.0f;
+  result.inlier_ratio = 1.0f;
+  result.ms.integrate_ms = watch.lap_ms();
+  have_map_ = true;
+  return result;
+}
+
+/// Paper Fig. 2: initial pose, dynamics from its residuals, refined pose, integration.
+FrameResult Pipeline::track_and_map(FrameResult result) {
+  StopWatch watch;
+  const TrackResult initial = engine_.track(cast<float>(predicted(result.stamp)));
+  result.ms.track_ms = watch.lap_ms();
+  const MaskResult mask = engine_.mask(initial.T_world_cam);
+  result.ms.mask_ms = watch.lap_ms();
+  // With nothing masked the second registration would solve the first one's problem again.
+  const TrackResult refined = mask.masked_valid_pixels > 0 ? engine_.refine(initial.T_world_cam) : initial;
+  result.ms.refine_ms = watch.lap_ms();
+
+  const int32_t pixels = engine_.mask_image().pixels();
+  result.masked_fraction = static_cast<float>(mask.masked_pixels) / static_cast<float>(pixels);
+  result.state = state_of(refined, config_.track);
+  result.p_good = probability_good(refined.inlier_ratio, config_.track);
+  result.inlier_ratio = refined.inlier_ratio;
+  if (refined.status == Status::ok) {
+    std::copy_n(refined.covariance, 21, result.covariance);
+    result.T_map_cam = cast<double>(refined.T_world_cam);
+  }
+  if (result.state == TrackingState::good)
+    engine_.integrate(refined.T_world_cam);  // a poor pose freezes the map
+  result.ms.integrate_ms = watch.lap_ms();
+  return result;
+}
+
+/// Where the registration starts (DESIGN section 5): the last pose, or the last motion continued.
+Se3d Pipeline::predicted(Stamp stamp) const {
+  if (config_.track.prior == MotionPrior::last_pose || !have_motion_ || lost_) return T_map_cam_;
+  const double before_s = static_cast<double>(stamp_.ns - stamp_before_.ns) * 1e-9;
+  const double ahead_s = static_cast<double>(stamp.ns - stamp_.ns) * 1e-9;
+  if (before_s <= 0 || ahead_s <= 0) return T_map_cam_;
+  const double scale = std::min(ahead_s / before_s, 2.0);  // a gap is no reason to leap
+  const Twistd motion = log(inverse(T_map_cam_before_) * T_map_cam_);
+  return T_map_cam_ * exp(Twistd{scale * motion.v, scale * motion.w});
+}
+
+void Pipeline::remember(const FrameResult& result) {
+  ++counters_.frames;
+  if (result.status != Status::ok) {
+    ++counters_.bad_frames;
+    return;
+  }
+  const bool lost = result.state == TrackingState::lost;
+  if (lost) ++counters_.lost_frames;
+  if (lost_ && !lost) ++counters_.relocalised;
+  have_motion_ = counters_.frames - counters_.bad_frames > 1 && !lost && !lost_;
+  lost_ = lost;
+  T_map_cam_before_ = T_map_cam_;
+  stamp_before_ = stamp_;
+  T_map_cam_ = result.T_map_cam;
+  stamp_ = result.stamp;
+}
+
+}  // namespace stillmap

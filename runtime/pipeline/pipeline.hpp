@@ -52,6 +52,7 @@ class Pipeline {
   const PipelineCounters& counters() const { return counters_; }
 
  private:
+  FrameResult start_map(FrameResult result);
   FrameResult track_and_map(FrameResult result);
   Se3d predicted(Stamp stamp) const;
   void remember(const FrameResult& result);

@@ -1,2 +1,379 @@
-// The CPU engine (see engine.hpp).
+// The CPU engine: owns the memory, hands views to the loops.
+
+#include <algorithm>
+#include <cmath>
+#include <new>
+
+#include "kernels/backend/cpu/arena.hpp"
+#include "kernels/backend/cpu/loops.hpp"
+#include "kernels/backend/cpu/map_storage.hpp"
+#include "kernels/backend/cpu/thread_pool.hpp"
 #include "kernels/engine.hpp"
+#include "kernels/mask/grow_mask.hpp"
+#include "kernels/track/track.hpp"
+
+namespace stillmap {
+namespace {
+
+constexpr int32_t kRowsPerTile = 16;  ///< of the finest level; a multiple of the coarsest step
+constexpr uint32_t kGroupsPerTile = 16;
+constexpr uint32_t kBlocksPerTile = 32;
+
+/// A length or count of 640x480 pixels, scaled to the image.
+int32_t scaled_px(int32_t px_at_640, int32_t width) {
+  return static_cast<int32_t>(std::lround(static_cast<double>(px_at_640) * width / 640.0));
+}
+int32_t scaled_pixels(int32_t pixels_at_vga, const Intrinsics& k) {
+  return static_cast<int32_t>(static_cast<double>(pixels_at_vga) * k.width * k.height / (640.0 * 480.0));
+}
+uint32_t tiles_of(int32_t length, int32_t tile) {
+  return static_cast<uint32_t>((length + tile - 1) / tile);
+}
+
+/// Farthest that a frame can change the map, along the optical axis.
+float far_plane_m(const EngineParams& p) {
+  return std::max(p.integrate.free_max_m, p.depth.max_m) + p.map.truncation_m;
+}
+
+/// From the camera to the corner of its view at the far plane: no view box is longer than twice this.
+float reach_m(const EngineParams& p) {
+  const Intrinsics& k = p.camera.k;
+  const float x = std::max(std::fabs(k.cx), std::fabs(static_cast<float>(k.width) - k.cx)) / k.fx;
+  const float y = std::max(std::fabs(k.cy), std::fabs(static_cast<float>(k.height) - k.cy)) / k.fy;
+  return far_plane_m(p) * std::sqrt(1.0f + x * x + y * y);
+}
+
+float group_m(const MapParams& map) {
+  return map.voxel_m * static_cast<float>(kBlockEdge * kGroupEdge);
+}
+
+/// Groups that the largest view box can hold: its edges are at most the view's longest diagonal.
+uint64_t max_groups(const EngineParams& p) {
+  const auto edge = static_cast<uint64_t>(std::ceil(1.2f * reach_m(p) / group_m(p.map))) + 3;
+  return edge * edge * edge;
+}
+
+/// Everything that lives as long as the engine.
+struct CpuMemory {
+  ImageView<float> depth_m, luma, static_depth_m;
+  ImageView<Rgb8> colour;
+  ImageView<Pixel> source_pixel;  ///< only with distortion
+  ImageView<uint8_t> mask, mask_scratch;
+  View<int32_t> flood_queue;
+  DepthRangePyramid ranges;
+  View<NormalEqT<float>> track_tiles;
+  View<int32_t> valid_tiles;
+  View<GroupView> groups;
+  View<VisibleBlock> visible;
+  MapStorage map;
+
+  void carve(Arena& arena, const EngineParams& p) {
+    const int32_t rows = p.camera.k.height, cols = p.camera.k.width;
+    depth_m = arena.take_image<float>("images", rows, cols);
+    luma = arena.take_image<float>("images", rows, cols);
+    static_depth_m = arena.take_image<float>("images", rows, cols);
+    colour = arena.take_image<Rgb8>("images", rows, cols);
+    mask = arena.take_image<uint8_t>("mask", rows, cols);
+    mask_scratch = arena.take_image<uint8_t>("mask", rows, cols);
+    flood_queue = arena.take<int32_t>("mask", static_cast<uint64_t>(rows) * static_cast<uint64_t>(cols));
+    if (!p.camera.distortion.none()) source_pixel = arena.take_image<Pixel>("undistortion", rows, cols);
+    carve_ranges(arena, rows, cols);
+    const uint32_t tiles = tiles_of(rows, kRowsPerTile);
+    track_tiles = arena.take<NormalEqT<float>>("sums of tiles", tiles);
+    valid_tiles = arena.take<int32_t>("sums of tiles", tiles);
+    groups = arena.take<GroupView>("visible blocks", max_groups(p));
+    visible = arena.take<VisibleBlock>("visible blocks", static_cast<uint64_t>(p.map.pool_blocks));
+    map.carve(arena, p.map);
+  }
+
+ private:
+  void carve_ranges(Arena& arena, int32_t rows, int32_t cols) {
+    ranges.image_rows = rows;
+    ranges.image_cols = cols;
+    int32_t r = static_cast<int32_t>(tiles_of(rows, kTilePx)),
+            c = static_cast<int32_t>(tiles_of(cols, kTilePx));
+    while (ranges.levels < kMaxLevels) {
+      ranges.level[ranges.levels++] = arena.take_image<DepthRange>("depth ranges", r, c);
+      if (r == 1 && c == 1) break;
+      r = (r + 1) / 2;
+      c = (c + 1) / 2;
+    }
+  }
+};
+
+class CpuEngine final : public Engine {
+ public:
+  CpuEngine(const EngineParams& params, uint64_t bytes)
+      : params_(params), arena_(bytes), loops_(best_loops()), pool_(params.threads) {
+    if (arena_.failed()) return;
+    memory_.carve(arena_, params_);
+    memory_.map.clear();
+    fill_source_pixels();
+  }
+  bool failed() const { return arena_.failed(); }
+
+  PrepareResult prepare(const FrameView& frame) override;
+  TrackResult track(const Se3& T_world_cam_start) override {
+    return register_to_map(T_world_cam_start, false);
+  }
+  MaskResult mask(const Se3& T_world_cam) override;
+  TrackResult refine(const Se3& T_world_cam_start) override {
+    return register_to_map(T_world_cam_start, true);
+  }
+  IntegrateResult integrate(const Se3& T_world_cam) override;
+  Status raycast(const Se3&, const Intrinsics&, ImageView<float>, ImageView<Rgb8>) override {
+    return Status::unavailable;
+  }
+  Status extract_mesh(MeshSink&) override { return Status::unavailable; }
+
+  ImageView<const uint8_t> mask_image() const override { return memory_.mask; }
+  ImageView<const float> depth_image_m() const override { return memory_.depth_m; }
+  ImageView<const Rgb8> colour_image() const override { return memory_.colour; }
+  MapHealth map_health() const override { return memory_.map.health(); }
+  void reset_map() override { memory_.map.clear(); }
+
+ private:
+  const Intrinsics& k() const { return params_.camera.k; }
+  void fill_source_pixels();
+  TrackResult register_to_map(const Se3& T_start, bool masked);
+  void set_nothing_masked();
+  void update_static_depth();
+  VisibleGroupPass visible_pass(const Se3& T_map_cam, const FrameGeometry& geometry) const;
+  Status list_visible(const VisibleGroupPass& pass, uint32_t& visible_count);
+
+  EngineParams params_;
+  Arena arena_;
+  CpuMemory memory_;
+  const CpuLoops& loops_;
+  ThreadPool pool_;
+  uint32_t frames_ = 0;
+};
+
+void CpuEngine::fill_source_pixels() {
+  const ImageView<Pixel>& map = memory_.source_pixel;
+  for (int32_t r = 0; r < map.rows; ++r)
+    for (int32_t c = 0; c < map.cols; ++c)
+      map.at(r, c) = distort(params_.camera, {static_cast<float>(c), static_cast<float>(r)});
+}
+
+PrepareResult CpuEngine::prepare(const FrameView& frame) {
+  const auto right_size = [&](int32_t rows, int32_t cols) { return rows == k().height && cols == k().width; };
+  if (!right_size(frame.depth_raw.rows, frame.depth_raw.cols) ||
+      !right_size(frame.colour.rows, frame.colour.cols))
+    return {Status::bad_data, 0};
+  const PreparePass pass{frame.depth_raw,
+                         frame.colour,
+                         memory_.depth_m,
+                         memory_.luma,
+                         memory_.colour,
+                         memory_.source_pixel,
+                         1.0f / params_.depth_units_per_m,
+                         params_.depth.min_m,
+                         params_.depth.max_m};
+  const uint32_t tiles = tiles_of(k().height, kRowsPerTile);
+  pool_.for_each(tiles, [&](uint32_t tile) {
+    const int32_t first = static_cast<int32_t>(tile) * kRowsPerTile;
+    memory_.valid_tiles[tile] = loops_.prepare(pass, first, std::min(first + kRowsPerTile, k().height));
+  });
+  PrepareResult result;
+  for (uint32_t t = 0; t < tiles; ++t) result.valid_pixels += memory_.valid_tiles[t];
+  set_nothing_masked();
+  if (result.valid_pixels < scaled_pixels(params_.depth.min_valid_pixels, k()))
+    result.status = Status::bad_data;
+  return result;
+}
+
+void CpuEngine::set_nothing_masked() {
+  std::fill_n(memory_.mask.data, memory_.mask.pixels(), uint8_t{0});
+}
+
+TrackResult CpuEngine::register_to_map(const Se3& T_start, bool masked) {
+  struct Context {
+    CpuEngine* engine;
+    TrackPass pass;
+  } context{this,
+            {memory_.map.view(),
+             memory_.depth_m,
+             memory_.luma,
+             {},
+             k(),
+             T_start,
+             params_.depth.max_m,
+             params_.track.colour_weight,
+             params_.track.huber_depth_m,
+             params_.track.inlier_m}};
+  if (masked) context.pass.mask = memory_.mask;
+  const PassRunner runner{[](void* opaque, const Se3& T_map_cam, int32_t step) {
+                            auto& [engine, pass] = *static_cast<Context*>(opaque);
+                            pass.T_map_cam = T_map_cam;
+                            const int32_t rows = engine->k().height;
+                            const uint32_t tiles = tiles_of(rows, kRowsPerTile);
+                            engine->pool_.for_each(tiles, [&](uint32_t tile) {
+                              const int32_t first = static_cast<int32_t>(tile) * kRowsPerTile;
+                              engine->memory_.track_tiles[tile] = engine->loops_.track(
+                                  pass, first, std::min(first + kRowsPerTile, rows), step);
+                            });
+                            NormalEq sums;
+                            for (uint32_t t = 0; t < tiles; ++t) sums.add(engine->memory_.track_tiles[t]);
+                            return sums;
+                          },
+                          &context};
+  return register_frame(runner, T_start, params_.track, scaled_pixels(params_.depth.min_valid_pixels, k()));
+}
+
+MaskResult CpuEngine::mask(const Se3& T_world_cam) {
+  MaskResult result;
+  if (!params_.mask.enabled) return result;
+  const float tau_m = params_.map.truncation_m;
+  const ResidualMaskPass pass{memory_.map.view(),
+                              memory_.depth_m,
+                              memory_.mask,
+                              k(),
+                              T_world_cam,
+                              params_.depth.max_m,
+                              params_.mask.gamma * tau_m * tau_m};
+  const int32_t rows = k().height, cols = k().width;
+  const auto in_row_tiles = [&](const auto& f) {
+    pool_.for_each(tiles_of(rows, kRowsPerTile), [&](uint32_t tile) {
+      const int32_t first = static_cast<int32_t>(tile) * kRowsPerTile;
+      f(first, std::min(first + kRowsPerTile, rows));
+    });
+  };
+  constexpr int32_t kColsPerTile = 64;
+  const auto in_column_tiles = [&](const auto& f) {
+    pool_.for_each(tiles_of(cols, kColsPerTile), [&](uint32_t tile) {
+      const int32_t first = static_cast<int32_t>(tile) * kColsPerTile;
+      f(first, std::min(first + kColsPerTile, cols));
+    });
+  };
+  const ImageView<uint8_t> image = memory_.mask, scratch = memory_.mask_scratch;
+  const int32_t erode = scaled_px(params_.mask.erode_px, cols),
+                dilate = scaled_px(params_.mask.dilate_px, cols);
+  in_row_tiles([&](int32_t first, int32_t last) {
+    loops_.residual_mask(pass, first, last);
+    erode_rows(image, scratch, erode, first, last);
+  });
+  in_column_tiles([&](int32_t first, int32_t last) { erode_columns(scratch, image, erode, first, last); });
+  flood_fill(image, memory_.depth_m, params_.mask.flood_depth_ratio, memory_.flood_queue);
+  in_row_tiles([&](int32_t first, int32_t last) { dilate_rows(image, scratch, dilate, first, last); });
+  in_column_tiles([&](int32_t first, int32_t last) { dilate_columns(scratch, image, dilate, first, last); });
+  for (int32_t i = 0; i < image.pixels(); ++i) {
+    result.masked_pixels += image.data[i] != 0;
+    result.masked_valid_pixels += image.data[i] != 0 && memory_.depth_m.data[i] > 0;
+  }
+  return result;
+}
+
+void CpuEngine::update_static_depth() {
+  DepthRangePyramid& ranges = memory_.ranges;
+  const StaticDepthPass pass{memory_.depth_m, memory_.mask, memory_.static_depth_m, ranges.level[0]};
+  pool_.for_each(static_cast<uint32_t>(pass.tiles.rows),
+                 [&](uint32_t row) { loops_.static_depth(pass, static_cast<int32_t>(row)); });
+  for (int32_t l = 1; l < ranges.levels; ++l) {
+    const ImageView<DepthRange> fine = ranges.level[l - 1], coarse = ranges.level[l];
+    for (int32_t r = 0; r < coarse.rows; ++r)
+      for (int32_t c = 0; c < coarse.cols; ++c) {
+        const int32_t r1 = std::min(2 * r + 1, fine.rows - 1), c1 = std::min(2 * c + 1, fine.cols - 1);
+        coarse.at(r, c) = merged(merged(fine.at(2 * r, 2 * c), fine.at(2 * r, c1)),
+                                 merged(fine.at(r1, 2 * c), fine.at(r1, c1)));
+      }
+  }
+}
+
+/// The box of groups around the camera's view.
+VisibleGroupPass CpuEngine::visible_pass(const Se3& T_map_cam, const FrameGeometry& geometry) const {
+  const DepthRangePyramid& ranges = memory_.ranges;
+  const float farthest_m = std::min(
+      far_plane_m(params_), ranges.level[ranges.levels - 1].at(0, 0).max_m + params_.map.truncation_m);
+  Vec3 low = T_map_cam.translation, high = low;
+  for (int32_t corner = 0; corner < 4; ++corner) {
+    const float u = corner & 1 ? static_cast<float>(k().width) : -1.0f;
+    const float v = corner & 2 ? static_cast<float>(k().height) : -1.0f;
+    const Vec3 p = T_map_cam * unproject(k(), u, v, farthest_m);
+    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+  }
+  const float inv = 1.0f / group_m(params_.map);
+  const auto cell = [&](float x) { return static_cast<int32_t>(std::floor(x * inv)); };
+  const Int3 first = {cell(low.x), cell(low.y), cell(low.z)},
+             last = {cell(high.x), cell(high.y), cell(high.z)};
+  return {memory_.map.view(),
+          geometry,
+          ranges,
+          inverse(T_map_cam),
+          first,
+          {last.x - first.x + 1, last.y - first.y + 1, last.z - first.z + 1},
+          params_.integrate.free_space};
+}
+
+/// Lists the visible blocks, in an order that does not depend on threads; makes those that are new.
+Status CpuEngine::list_visible(const VisibleGroupPass& pass, uint32_t& visible_count) {
+  Status status = Status::ok;
+  const uint64_t wanted = static_cast<uint64_t>(pass.groups.x) * static_cast<uint64_t>(pass.groups.y) *
+                          static_cast<uint64_t>(pass.groups.z);
+  const uint32_t count = static_cast<uint32_t>(std::min<uint64_t>(wanted, memory_.groups.size));
+  if (count < wanted) status = Status::capacity_exhausted;
+  pool_.for_each((count + kGroupsPerTile - 1) / kGroupsPerTile, [&](uint32_t tile) {
+    const uint32_t end = std::min((tile + 1) * kGroupsPerTile, count);
+    for (uint32_t g = tile * kGroupsPerTile; g < end; ++g) memory_.groups[g] = loops_.visible_group(pass, g);
+  });
+  visible_count = 0;
+  for (uint32_t g = 0; g < count; ++g) {
+    const GroupView view = memory_.groups[g];
+    for (uint64_t bits = view.free | view.mixed; bits; bits &= bits - 1) {
+      const int32_t bit = __builtin_ctzll(bits);
+      const InsertResult block = memory_.map.insert(pack(pass.block_at(g, bit)));
+      if (block.block == kNoBlock) {
+        status = Status::capacity_exhausted;
+        continue;
+      }
+      const bool free = view.free >> bit & 1;
+      if (free && pass.map.settled_free[block.block]) continue;
+      memory_.visible[visible_count++] = {block.block | (free ? VisibleBlock::kFree : 0u)};
+    }
+  }
+  return status;
+}
+
+IntegrateResult CpuEngine::integrate(const Se3& T_world_cam) {
+  IntegrateResult result;
+  if (memory_.map.above_high_water()) {
+    memory_.map.drop_farthest(T_world_cam.translation);
+    result.status = Status::capacity_exhausted;
+  }
+  update_static_depth();
+  const FrameGeometry geometry{memory_.static_depth_m,       k(),
+                               params_.depth.min_m,          params_.depth.max_m,
+                               params_.integrate.free_max_m, params_.map.truncation_m};
+  const VisibleGroupPass visible = visible_pass(T_world_cam, geometry);
+  const Status listed = list_visible(visible, result.visible_blocks);
+  if (listed != Status::ok) result.status = listed;
+  const IntegratePass pass{
+      memory_.map.view(),           geometry, memory_.colour, visible.T_cam_map, params_.integrate.weight_cap,
+      params_.integrate.free_space, frames_++};
+  const View<const VisibleBlock> blocks{memory_.visible.data, result.visible_blocks};
+  pool_.for_each((blocks.size + kBlocksPerTile - 1) / kBlocksPerTile, [&](uint32_t tile) {
+    const uint32_t first = tile * kBlocksPerTile;
+    loops_.integrate(pass, {blocks.data + first, std::min(kBlocksPerTile, blocks.size - first)});
+  });
+  result.map = memory_.map.health();
+  return result;
+}
+
+}  // namespace
+
+MemoryItems plan_cpu_engine(const EngineParams& params) {
+  Arena arena;
+  CpuMemory memory;
+  memory.carve(arena, params);
+  return arena.items();
+}
+
+std::unique_ptr<Engine> make_cpu_engine(const EngineParams& params) {
+  const uint64_t bytes = plan_cpu_engine(params).total_bytes;
+  std::unique_ptr<CpuEngine> engine(new (std::nothrow) CpuEngine(params, bytes));
+  if (!engine || engine->failed()) return nullptr;
+  return engine;
+}
+
+}  // namespace stillmap

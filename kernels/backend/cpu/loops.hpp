@@ -1,0 +1,38 @@
+#pragma once
+
+// The hot loops. loops.cpp is compiled once for each instruction set; the engine picks a table when it is
+// made.
+
+#include <cstdint>
+
+#include "kernels/integrate/depth_range.hpp"
+#include "kernels/integrate/integrate_pass.hpp"
+#include "kernels/integrate/visible_blocks.hpp"
+#include "kernels/mask/residual_mask.hpp"
+#include "kernels/prepare/prepare_pixel.hpp"
+#include "kernels/track/track_pass.hpp"
+
+namespace stillmap {
+
+struct CpuLoops {
+  const char* name;
+  /// @return pixels with a depth in range, rows [first, last)
+  int32_t (*prepare)(const PreparePass&, int32_t first_row, int32_t last_row);
+  /// Sums over every `step`-th pixel of every `step`-th row in [first, last).
+  NormalEqT<float> (*track)(const TrackPass&, int32_t first_row, int32_t last_row, int32_t step);
+  void (*residual_mask)(const ResidualMaskPass&, int32_t first_row, int32_t last_row);
+  void (*static_depth)(const StaticDepthPass&, int32_t tile_row);
+  GroupView (*visible_group)(const VisibleGroupPass&, uint32_t group);
+  void (*integrate)(const IntegratePass&, View<const VisibleBlock>);
+};
+
+extern const CpuLoops kLoopsBaseline;
+#if defined(__x86_64__)
+extern const CpuLoops kLoopsAvx2;
+#endif
+
+/// Best table for this machine; STILLMAP_ISA=baseline in the environment asks for the plain one.  @thread
+/// boot
+const CpuLoops& best_loops();
+
+}  // namespace stillmap

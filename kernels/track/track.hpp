@@ -1,0 +1,29 @@
+#pragma once
+
+// Levenberg-Marquardt over three sub-samplings (paper section III-B). Host code; an engine supplies the
+// passes.
+
+#include "kernels/base/normal_eq.hpp"
+#include "kernels/engine.hpp"
+#include "kernels/params.hpp"
+
+namespace stillmap {
+
+/// Sums of one pass over every `step`-th pixel at a pose. A plain function and its context: nothing is
+/// allocated.
+struct PassRunner {
+  NormalEq (*run)(void* context, const Se3& T_map_cam, int32_t step) = nullptr;
+  void* context = nullptr;
+
+  NormalEq operator()(const Se3& T_map_cam, int32_t step) const { return run(context, T_map_cam, step); }
+};
+
+/// Minimises E_d + w_c E_c from `T_start`.                              test: track_test
+/// @param min_points with fewer points that have a value in the map the answer is `degenerate`, at the finest
+/// level
+/// @return status ok, or degenerate with T_world_cam = T_start
+/// @thread the engine's caller
+TrackResult register_frame(const PassRunner& pass, const Se3& T_start, const TrackParams& params,
+                           int32_t min_points);
+
+}  // namespace stillmap
