@@ -1,0 +1,136 @@
+#include "config/validate.hpp"
+
+#include <cmath>
+
+#include "config/fields.hpp"
+
+namespace stillmap {
+namespace {
+
+/// The voxels of a truncation band that fit into a block and its halo.
+constexpr float kMaxTruncationVoxels = 24;
+/// Trilinear gradients need a value on both sides of the surface.
+constexpr float kMinTruncationVoxels = 4;
+
+class Violations {
+ public:
+  void add(std::string line) { lines_.push_back(std::move(line)); }
+  void unless(bool fine, std::string line) {
+    if (!fine) add(std::move(line));
+  }
+  std::vector<std::string> take() { return std::move(lines_); }
+
+ private:
+  std::vector<std::string> lines_;
+};
+
+/// A float is held against the float nearest to the bound, so that the bound itself is inside.
+template <class T>
+bool in_range(T value, const Field& field) {
+  if constexpr (std::is_same_v<T, float>)
+    return value >= static_cast<float>(field.lowest) && value <= static_cast<float>(field.highest);
+  else
+    return static_cast<double>(value) >= field.lowest && static_cast<double>(value) <= field.highest;
+}
+
+void check_ranges(const Config& config, Violations& out) {
+  for_each_field(config, [&](const Field& field, const auto& value) {
+    if (!in_range(value, field))
+      out.add(field.name() + " = " + value_text(field, value) + ": allowed " + bound_text(field.lowest) +
+              " to " + bound_text(field.highest) + " (" + field.unit + ")");
+  });
+}
+
+std::string setting(const char* name, float value) {
+  return std::string(name) + " = " + float_text(value);
+}
+
+void check_camera(const CameraConfig& camera, Violations& out) {
+  if (camera.fx > 0) {
+    out.unless(camera.fy > 0, setting("camera.fy", camera.fy) + ": must be above 0 when camera.fx is set");
+    out.unless(camera.cx > 0, setting("camera.cx", camera.cx) + ": must be above 0 when camera.fx is set");
+    out.unless(camera.cy > 0, setting("camera.cy", camera.cy) + ": must be above 0 when camera.fx is set");
+    return;
+  }
+  const std::pair<const char*, float> others[] = {
+      {"camera.fy", camera.fy}, {"camera.cx", camera.cx}, {"camera.cy", camera.cy}, {"camera.k1", camera.k1},
+      {"camera.k2", camera.k2}, {"camera.p1", camera.p1}, {"camera.p2", camera.p2}, {"camera.k3", camera.k3}};
+  for (const auto& [name, value] : others)
+    out.unless(value == 0, setting(name, value) + ": has no effect while camera.fx is 0; set camera.fx too");
+}
+
+void check_depth(const Config& config, Violations& out) {
+  const DepthParams& depth = config.depth;
+  out.unless(depth.min_m < depth.max_m, setting("depth.min_m", depth.min_m) +
+                                            ": must be below depth.max_m = " + float_text(depth.max_m));
+}
+
+void check_track(const Config& config, Violations& out) {
+  const TrackParams& track = config.track;
+  out.unless(track.poor_inlier_ratio >= track.lost_inlier_ratio,
+             setting("track.poor_inlier_ratio", track.poor_inlier_ratio) +
+                 ": must be at least track.lost_inlier_ratio = " + float_text(track.lost_inlier_ratio));
+  out.unless(track.inlier_m < config.map.truncation_m,
+             setting("track.inlier_m", track.inlier_m) + ": must be below map.truncation_m = " +
+                 float_text(config.map.truncation_m) + ", or every point counts as an inlier");
+  int64_t iterations = track.iterations_fine;
+  if (track.levels >= 2) iterations += track.iterations_middle;
+  if (track.levels >= 3) iterations += track.iterations_coarse;
+  out.unless(iterations > 0, "track.iterations_fine = " + std::to_string(track.iterations_fine) +
+                                 ": at least one level of track.levels = " + std::to_string(track.levels) +
+                                 " must have an iteration");
+}
+
+void check_map(const MapParams& map, Violations& out) {
+  const float voxels = map.truncation_m / map.voxel_m;
+  constexpr float kRounding = 1e-4f;
+  const bool fine = voxels >= kMinTruncationVoxels - kRounding && voxels <= kMaxTruncationVoxels + kRounding;
+  out.unless(fine, setting("map.truncation_m", map.truncation_m) + ": allowed " +
+                       float_text(kMinTruncationVoxels * map.voxel_m) + " to " +
+                       float_text(kMaxTruncationVoxels * map.voxel_m) +
+                       " (4 to 24 times map.voxel_m = " + float_text(map.voxel_m) + ")");
+}
+
+void check_source(const SourceConfig& source, Violations& out) {
+  out.unless(source.wait_s >= 0 || source.wait_s == -1,
+             setting("source.wait_s", source.wait_s) + ": allowed 0 and above, or -1 for ever");
+}
+
+void check_missing_parts(const Config& config, Violations& out) {
+  const char* missing = " is not part of this build; ";
+  if (config.depth.invalid == InvalidDepth::complete)
+    out.add(std::string("depth.invalid = complete") + missing + "set depth.invalid = \"ignore\"");
+  if (config.record.map) out.add(std::string("record.map = true") + missing + "set record.map = false");
+  if (config.record.log) out.add(std::string("record.log = true") + missing + "set record.log = false");
+}
+
+}  // namespace
+
+std::vector<std::string> violations(const Config& config) {
+  Violations out;
+  check_ranges(config, out);
+  check_camera(config.camera, out);
+  check_source(config.source, out);
+  check_depth(config, out);
+  check_track(config, out);
+  check_map(config.map, out);
+  check_missing_parts(config, out);
+  return out.take();
+}
+
+std::string camera_problem(const CameraModel& camera) {
+  const Intrinsics& k = camera.k;
+  const Distortion& d = camera.distortion;
+  for (const float value : {k.fx, k.fy, k.cx, k.cy, d.k1, d.k2, d.p1, d.p2, d.k3})
+    if (!std::isfinite(value)) return "intrinsics must be finite numbers";
+  if (!(k.fx > 0) || !(k.fy > 0))
+    return "focal length fx = " + float_text(k.fx) + ", fy = " + float_text(k.fy) + " must be above 0 pixels";
+  if (k.width <= 0 || k.height <= 0) return {};
+  const bool inside =
+      k.cx > 0 && k.cy > 0 && k.cx < static_cast<float>(k.width) && k.cy < static_cast<float>(k.height);
+  if (inside) return {};
+  return "centre cx = " + float_text(k.cx) + ", cy = " + float_text(k.cy) + " lies outside the image of " +
+         std::to_string(k.width) + "x" + std::to_string(k.height) + " pixels";
+}
+
+}  // namespace stillmap
