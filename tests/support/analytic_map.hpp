@@ -55,7 +55,8 @@ class AnalyticMap {
   VoxelSurface& surface(Int3 voxel) { return block(block_of_voxel(voxel))->surface[index_in_block(voxel)]; }
   VoxelRecord& record(Int3 voxel) { return block(block_of_voxel(voxel))->record[index_in_block(voxel)]; }
 
-  /// Writes all blocks from `first` to `last` (block coordinates, both included), in `order_seed`'s order (0: sorted).
+  /// Writes all blocks from `first` to `last` (block coordinates, both included), in `order_seed`'s order (0:
+  /// sorted).
   void fill(Int3 first, Int3 last, const AnalyticField& field, uint32_t order_seed = 0) {
     std::vector<Int3> order;
     for (int32_t z = first.z; z <= last.z; ++z)
