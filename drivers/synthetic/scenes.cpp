@@ -1,0 +1,460 @@
+// The scenes, after the Bonn RGB-D Dynamic Dataset. The camera is most often in the west of the room and
+// looks east
+// (+x); people come from beside it. Where a person is near, the numbers keep 0.6 m to the lens.
+
+#include <algorithm>
+#include <array>
+
+#include "drivers/synthetic/motion.hpp"
+
+namespace stillmap::synthetic {
+
+namespace {
+
+constexpr Spot2 kToCamera = {-0.25, 0.0};
+constexpr Spot2 kNorthWing = {-0.85, 0.98};  // out of view beside the camera
+constexpr Spot2 kSouthWing = {-0.85, -1.10};
+constexpr Spot2 kSouthCorner = {-1.25, -1.40};
+
+const Material kCarton = {Pattern::poster, {176, 134, 90}, {210, 180, 140}, 0.11f, 21};
+const Material kBigCarton = {Pattern::cloud, {150, 112, 74}, {196, 158, 112}, 0.09f, 22};
+
+Vec3 to_float(double x, double y, double z) {
+  return {static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)};
+}
+
+void add_box(World& world, Vec3 centre, Vec3 half, float yaw, const Material& material, bool moving) {
+  world.shapes.push_back(make_box(centre, half, material, yaw));
+  world.shapes.back().moving = moving;
+}
+
+/// The hands at the two sides of a box whose width is along its local y.
+void hold(Stance& person, Vec3 centre, Vec3 half, float box_yaw, float height_m) {
+  const Vec3 side = yaw_rotation(box_yaw) * Vec3{0, half.y + 0.03f, 0};
+  const Vec3 grip = centre + Vec3{0, 0, height_m};
+  const Vec3 left = {-std::sin(person.yaw), std::cos(person.yaw), 0};
+  const bool same_side = dot(left, side) > 0.0f;
+  person.holds = true;
+  person.left_hand_m = same_side ? grip + side : grip - side;
+  person.right_hand_m = same_side ? grip - side : grip + side;
+}
+
+void no_movers(double, World&) {}
+
+// ---- static, loop, fast
+// ---------------------------------------------------------------------------------------
+
+Se3d static_camera(double t) {
+  static const Sway sway = {{-1.30, 0.0, 1.35}, {0.20, 0.45, 0.10}, {6.7, 5.2, 4.4}, 0, 14, 6.1, -7, 5, 4.7};
+  return sway_camera(sway, t);
+}
+
+Se3d loop_camera(double t) {
+  // One turn in 19 s: the last second sees again what the first one saw.
+  const double turn = from_rest(t) / 19.0;
+  const double angle = kTurn * turn;
+  const Vec3d place = {0.05 + 0.62 * std::cos(angle), -0.08 + 0.50 * std::sin(angle),
+                       1.32 + 0.08 * std::sin(3 * angle)};
+  return handheld(place, angle, kDegree * (-8.0 + 5.0 * std::sin(2 * angle)), t);
+}
+
+Se3d fast_camera(double t) {
+  static const Sway sway = {{-0.75, 0.0, 1.38}, {0.16, 0.35, 0.07}, {6.7, 5.2, 4.4}, 0, 6, 6.1, -7, 5, 4.7};
+  // Swings of up to 100 degrees in a second, about 6 degrees a frame in their middle.
+  const double swing = 50.0 * rise(1.5, 2.3, t) - 100.0 * rise(2.9, 3.9, t) + 100.0 * rise(4.9, 5.85, t) -
+                       50.0 * rise(6.6, 7.3, t) + 45.0 * rise(7.9, 8.6, t) - 45.0 * rise(9.0, 9.7, t);
+  return handheld(sway_place(sway, t), sway_yaw(sway, t) + kDegree * swing, sway_pitch(sway, t), t);
+}
+
+// ---- balloon
+// --------------------------------------------------------------------------------------------------
+
+constexpr float kBalloonM = 0.30f;
+
+void add_balloon_and_person(World& world, const Stance& stance, Vec3 balloon) {
+  Stance person = stance;
+  person.holds = true;  // hands below the balloon, ready to push it up
+  const Vec3 side = {-0.16f * std::sin(stance.yaw), 0.16f * std::cos(stance.yaw), 0};
+  const Vec3 under = balloon - Vec3{0, 0, 0.8f * kBalloonM};
+  person.left_hand_m = under + side;
+  person.right_hand_m = under - side;
+  add_person(world, person, 0);
+  Shape ball = make_ellipsoid(balloon, {kBalloonM, kBalloonM, 1.1f * kBalloonM},
+                              {Pattern::cloud, {196, 40, 50}, {226, 90, 84}, 0.25f, 5});
+  ball.moving = true;
+  world.shapes.push_back(ball);
+}
+
+/// 0..1, as a ball that is pushed up once in `period_s`.
+double bounce(double t, double period_s) {
+  const double x = t / period_s - std::floor(t / period_s);
+  return 4.0 * x * (1.0 - x);
+}
+
+Se3d balloon_camera(double t) {
+  static const Sway sway = {{-1.38, 0.0, 1.36}, {0.10, 0.34, 0.06}, {6.3, 4.3, 4.9}, 0, 8, 5.3, -3, 2.5, 4.7};
+  return sway_camera(sway, t);
+}
+
+void balloon_movers(double t, World& world) {
+  const double in = rise(0.8, 2.6, t);
+  const auto path = [](double s) {
+    return mixed(kSouthWing, Spot2{0.50 + 0.15 * wave(s, 5.7), 0.40 * wave(s, 6.4)}, rise(0.8, 2.6, s));
+  };
+  const Stance person = walk(path, t, {-0.6, 0});
+  const Vec3 play =
+      to_float(-0.02 + 0.10 * wave(t, 4.1), 0.48 * wave(t, 5.2, 0.1), 1.12 + 0.42 * bounce(t, 1.5));
+  const Vec3 carried = before(person, 0.45f, 1.1f);
+  add_balloon_and_person(world, person, carried + static_cast<float>(in) * (play - carried));
+}
+
+Vec3d tracked_balloon(double t) {
+  const double in = rise(0.9, 2.6, t);
+  const Vec3d start = {-0.75, -1.12, 1.25};
+  const Vec3d play = {0.05 + 0.35 * wave(t, 6.2), 0.72 * wave(t, 5.4, 0.55), 1.12 + 0.40 * bounce(t, 1.7)};
+  return start + in * (play - start);
+}
+
+Se3d balloon_tracking_camera(double t) {
+  static const Sway sway = {{-1.36, 0.05, 1.36}, {0.12, 0.30, 0.06}, {6.3, 4.6, 4.9}, 0, 3, 5.3, -3, 2, 4.7};
+  const Vec3d place = sway_place(sway, t);
+  const Vec3d ahead = {0.4, 0.0, 1.30};
+  const Vec3d target = tracked_balloon(t - 0.12);
+  const Vec3d aim = ahead + 0.85 * rise(1.2, 3.0, t) * (target - ahead) - place;
+  return handheld(place, std::atan2(aim.y, aim.x), 0.7 * std::atan2(aim.z, std::hypot(aim.x, aim.y)), t);
+}
+
+void balloon_tracking_movers(double t, World& world) {
+  const auto path = [](double s) {
+    const Vec3d b = tracked_balloon(s - 0.35);
+    return Spot2{b.x + 0.50, 0.9 * b.y};
+  };
+  const Vec3d b = tracked_balloon(t);
+  add_balloon_and_person(world, walk(path, t, {-0.6, 0}), cast<float>(Se3d{{}, b}).translation);
+}
+
+// ---- crowds
+// ---------------------------------------------------------------------------------------------------
+
+Se3d crowd_camera(double t) {
+  static const Sway sway = {{-1.42, 0.0, 1.36}, {0.08, 0.34, 0.06}, {6.3, 4.4, 4.9}, 0, 9, 5.3, -4, 2.5, 4.7};
+  return sway_camera(sway, t);
+}
+
+/// Three people who cross the view in front of each other.
+Spot2 crowd_place(int who, double t) {
+  switch (who) {
+    case 0:
+      return {0.05 + 0.12 * wave(t, 3.7), 0.62 * wave(t, 5.6, 0.10)};
+    case 1:
+      return {0.62 + 0.12 * wave(t, 4.3), -0.75 * wave(t, 6.6, 0.05)};
+    default:
+      return {1.12 + 0.10 * wave(t, 5.1), 0.70 * wave(t, 4.9, 0.62)};
+  }
+}
+
+void crowd_movers(double t, World& world) {
+  const Spot2 wings[3] = {kNorthWing, kSouthWing, kSouthCorner};
+  const double from[3] = {0.8, 1.0, 1.8}, to[3] = {2.6, 3.2, 4.4};
+  for (int who = 0; who < 3; ++who) {
+    const auto path = [&](double s) {
+      return mixed(wings[who], crowd_place(who, s), rise(from[who], to[who], s));
+    };
+    add_person(world, walk(path, t, kToCamera), static_cast<uint32_t>(who));
+  }
+}
+
+void crowd_start_movers(double t, World& world) {
+  for (int who = 0; who < 3; ++who) {
+    // All stand still at first, then set off slowly one after the other.
+    const auto path = [&](double s) {
+      return crowd_place(who, 0.4 + 2.1 * who + from_rest(std::max(0.0, s - 0.5 * who), 2.5));
+    };
+    add_person(world, walk(path, t, kToCamera), static_cast<uint32_t>(3 + who));
+  }
+}
+
+Se3d crowd_close_camera(double t) {
+  static const Sway sway = {
+      {-1.50, 0.0, 1.36}, {0.06, 0.26, 0.05}, {6.3, 4.2, 4.9}, 0, 10, 5.3, -6, 2.5, 4.7};
+  return sway_camera(sway, t);
+}
+
+void crowd_close_movers(double t, World& world) {
+  const Spot2 wings[3] = {{-1.0, 1.15}, {-1.0, -1.2}, {-1.5, -1.5}};
+  const double from[3] = {0.8, 1.6, 1.5}, to[3] = {3.2, 4.2, 4.4};
+  for (int who = 0; who < 3; ++who) {
+    const auto path = [&](double s) {
+      const Spot2 near_by[3] = {{-0.48 + 0.05 * wave(s, 3.9), 0.45 * wave(s, 6.1, 0.15)},
+                                {-0.10 + 0.04 * wave(s, 4.4), -0.55 * wave(s, 5.2, 0.05)},
+                                {0.22 + 0.04 * wave(s, 3.3), 0.60 * wave(s, 4.7, 0.4)}};
+      return mixed(wings[who], near_by[who], rise(from[who], to[who], s));
+    };
+    add_person(world, walk(path, t, {-0.15, 0}), static_cast<uint32_t>(2 + who));
+  }
+}
+
+// ---- boxes
+// ----------------------------------------------------------------------------------------------------
+
+Se3d moving_box_camera(double t) {
+  static const Sway sway = {{-1.40, 0.0, 1.36}, {0.10, 0.36, 0.07}, {6.3, 4.8, 4.9}, 0, 9, 5.7, -5, 2.5, 4.7};
+  return sway_camera(sway, t);
+}
+
+void moving_box_movers(double t, World& world) {
+  const auto path = [](double s) {
+    const double slow = from_rest(std::max(0.0, s - 1.0), 2.0);
+    return mixed(kNorthWing, Spot2{0.22 + 0.16 * wave(slow, 6.9), 0.50 * wave(slow, 7.4, 0.2)},
+                 rise(0.9, 3.6, s));
+  };
+  Stance person = walk(path, t, {-0.8, 0});
+  const Vec3 half = {0.19f, 0.29f, 0.23f};
+  const Vec3 centre = before(person, 0.40f, 1.14f + 0.10f * static_cast<float>(wave(t, 4.2)));
+  hold(person, centre, half, person.yaw, -0.05f);
+  add_person(world, person, 1);
+  add_box(world, centre, half, person.yaw, kCarton, true);
+}
+
+const Sway& obstructing_sway() {
+  static const Sway sway = {{-1.44, 0.0, 1.36}, {0.05, 0.28, 0.05}, {6.3, 4.6, 4.9}, 0, 8, 5.7, -4, 2, 4.7};
+  return sway;
+}
+
+Se3d obstructing_camera(double t) {
+  return sway_camera(obstructing_sway(), t);
+}
+
+void obstructing_movers(double t, World& world) {
+  // The box is led with the camera: from beside it to 0.8 m before the lens, held there, then away into the
+  // room.
+  const auto relative = [](double s) {
+    static constexpr std::array<Waypoint, 7> way = {{{0.8, {0.10, -1.15}},
+                                                     {2.2, {0.75, -1.05}},
+                                                     {3.6, {0.86, -0.02}},
+                                                     {6.4, {0.86, 0.03}},
+                                                     {7.4, {1.15, -0.05}},
+                                                     {9.6, {1.45, 0.25}},
+                                                     {12.0, {1.40, -0.25}}}};
+    return along(way, s);
+  };
+  const auto place = [&](double s) {
+    const Vec3d camera = sway_place(obstructing_sway(), s);
+    const double yaw = sway_yaw(obstructing_sway(), s) * rise(1.5, 3.4, s) * (1.0 - rise(6.6, 7.6, s));
+    const Spot2 r = relative(s);
+    return Spot2{camera.x + std::cos(yaw) * r.x - std::sin(yaw) * r.y,
+                 camera.y + std::sin(yaw) * r.x + std::cos(yaw) * r.y};
+  };
+  const Vec3 half = {0.12f, 0.46f, 0.38f};
+  const Spot2 box = place(t);
+  const float height = 1.30f + 0.02f * static_cast<float>(wave(t, 3.1));
+  const auto yaw = static_cast<float>(0.5 * kTurn + 0.06 * wave(t, 3.7));
+  const Vec3 centre = {static_cast<float>(box.x), static_cast<float>(box.y), height};
+  Stance person = walk([&](double s) { return place(s) + Spot2{0.36, 0.0}; }, t, {-3.0, 0});
+  hold(person, centre, half, yaw, -0.15f);
+  add_person(world, person, 4);
+  add_box(world, centre, half, yaw, kBigCarton, true);
+}
+
+// A stand on which a box is put, or from which it is taken.
+constexpr Vec3 kStandHalf = {0.24f, 0.24f, 0.43f};
+constexpr Vec3 kCartonHalf = {0.20f, 0.24f, 0.19f};
+constexpr Spot2 kStand = {0.45, 0.10};
+constexpr float kRestHeightM = 2.0f * kStandHalf.z + kCartonHalf.z;
+
+void add_stand(World& world) {
+  add_box(world, to_float(kStand.x, kStand.y, static_cast<double>(kStandHalf.z)), kStandHalf, 0.0f,
+          {Pattern::planks, {70, 60, 52}, {130, 116, 100}, 0.10f, 7}, false);
+}
+
+void furnished_with_stand(World& world) {
+  furnished_room(world);
+  add_stand(world);
+}
+
+void bare_with_stand(World& world) {
+  bare_room(world);
+  add_stand(world);
+}
+
+Vec3 at_rest() {
+  return to_float(kStand.x, kStand.y, static_cast<double>(kRestHeightM));
+}
+
+Se3d stand_camera(double t) {
+  static const Sway sway = {{-1.40, 0.0, 1.38}, {0.10, 0.34, 0.07}, {6.3, 4.6, 4.9}, 0, 9, 5.7, -6, 2.5, 4.7};
+  return sway_camera(sway, t);
+}
+
+/// Strolls close before the camera, between it and the stand.
+Spot2 stroll(double t) {
+  return {-0.28 + 0.06 * wave(t, 5.3), 0.48 * wave(t, 6.2)};
+}
+
+void placing_movers(double t, World& world) {
+  const Spot2 before_stand = {kStand.x - 0.02, kStand.y - 0.58};
+  const auto path = [&](double s) {
+    static const std::array<Waypoint, 4> way = {
+        {{0.8, kSouthWing}, {2.4, {-0.20, -0.62}}, {3.9, {0.30, -0.70}}, {4.9, before_stand}}};
+    return mixed(along(way, s), stroll(s - 6.0), rise(6.4, 8.6, s));
+  };
+  const double turned = rise(4.0, 5.0, t) * (1.0 - rise(6.4, 7.2, t));
+  Stance person = walk(path, t, mixed({-0.6, 0.35}, {0.0, 3.0}, turned));
+  const float down = static_cast<float>(rise(4.9, 6.0, t));
+  const Vec3 carried = before(person, 0.43f, 1.22f);
+  const Vec3 centre = t < 6.0 ? carried + down * (at_rest() - carried) : at_rest();
+  const auto yaw = static_cast<float>((1.0 - static_cast<double>(down)) * static_cast<double>(person.yaw) +
+                                      static_cast<double>(down) * 0.25 * kTurn);
+  if (t < 6.2) hold(person, centre, kCartonHalf, t < 6.0 ? yaw : static_cast<float>(0.25 * kTurn), -0.02f);
+  add_person(world, person, 1);
+  add_box(world, centre, kCartonHalf, t < 6.0 ? yaw : static_cast<float>(0.25 * kTurn), kCarton, t < 6.0);
+}
+
+/// Somebody comes at `arrive_s`, takes the box from the stand at `take_s`, and walks about with it until
+/// `leave_s`.
+void carry_off(double t, double come_s, double take_s, double leave_s, uint32_t look_number, World& world) {
+  const Spot2 before_stand = {kStand.x - 0.02, kStand.y - 0.58};
+  const auto path = [&](double s) {
+    const std::array<Waypoint, 3> way = {
+        {{come_s, kSouthWing}, {0.5 * (come_s + take_s), {-0.25, -0.66}}, {take_s - 0.3, before_stand}}};
+    const Spot2 walk_about =
+        mixed(along(way, s), stroll(s) + Spot2{0.16, 0.0}, rise(take_s + 0.9, take_s + 3.2, s));
+    return mixed(walk_about, kNorthWing, rise(leave_s, leave_s + 1.8, s));
+  };
+  const double turned = rise(take_s - 1.2, take_s - 0.4, t) * (1.0 - rise(take_s + 1.0, take_s + 2.2, t));
+  Stance person = walk(path, t, mixed({-0.7, 0.30}, {0.0, 3.0}, turned));
+  const float up = static_cast<float>(rise(take_s, take_s + 1.3, t));
+  const Vec3 centre = at_rest() + up * (before(person, 0.43f, 1.20f) - at_rest());
+  const auto rest_yaw = static_cast<float>(0.25 * kTurn);
+  const float yaw = rest_yaw + up * (person.yaw - rest_yaw);
+  if (t > take_s - 0.3) hold(person, centre, kCartonHalf, yaw, -0.02f);
+  add_person(world, person, look_number);
+  add_box(world, centre, kCartonHalf, yaw, kCarton, t > take_s);
+}
+
+void removing_movers(double t, World& world) {
+  carry_off(t, 0.8, 3.8, 10.6, 2, world);
+}
+void kidnapping_movers(double t, World& world) {
+  carry_off(t, 2.4, 4.6, 12.4, 5, world);
+}
+
+constexpr Vec3 kCrateHalf = {0.20f, 0.42f, 0.64f};
+constexpr double kCrateDown = 7.6;
+
+void placing_obstructing_movers(double t, World& world) {
+  const auto crate = [](double s) {
+    static constexpr std::array<Waypoint, 5> way = {{{0.9, {-0.80, -1.12}},
+                                                     {3.0, {-0.42, -0.85}},
+                                                     {4.4, {-0.30, -0.35}},
+                                                     {6.0, {-0.32, 0.08}},
+                                                     {7.2, {-0.32, 0.05}}}};
+    return along(way, s);
+  };
+  const Spot2 c = crate(t);
+  const bool moving = t < kCrateDown;
+  const double lifted = 0.06 * (1.0 - rise(6.8, kCrateDown, t));
+  const Vec3 centre = to_float(c.x, c.y, static_cast<double>(kCrateHalf.z) + lifted);
+  const float yaw = static_cast<float>(0.15 * (1.0 - rise(1.0, 6.8, t)));
+  const auto path = [&](double s) {
+    const Spot2 behind = crate(s) + Spot2{0.44, 0.04};
+    return mixed(behind, Spot2{0.35 + 0.1 * wave(s, 4.1), 0.72 * wave(s - 8.0, 4.4)}, rise(7.9, 9.4, s));
+  };
+  Stance person = walk(path, t, mixed({-2.0, 0.0}, {-0.4, 0.0}, rise(7.7, 8.4, t)));
+  if (t < 7.8) hold(person, centre, kCrateHalf, yaw, 0.45f);
+  add_person(world, person, 3);
+  const Stance helper = walk(
+      [](double s) {
+        return mixed(kNorthWing, Spot2{0.80, 0.55 * wave(s, 5.1)}, rise(2.0, 4.6, s));
+      },
+      t, kToCamera);
+  add_person(world, helper, 0);
+  add_box(world, centre, kCrateHalf, yaw, kBigCarton, moving);
+}
+
+// ---- camera and people together
+// -------------------------------------------------------------------------------
+
+constexpr double kTourPeriod = 15.0;
+
+/// The person walks round the room; the camera follows on a slightly wider round.
+Spot2 round_of_the_room(double turn, double reach_x, double reach_y) {
+  return {0.02 + reach_x * std::cos(kTurn * turn), -0.06 + reach_y * std::sin(kTurn * turn)};
+}
+
+Spot2 tracked_person(double t) {
+  return round_of_the_room(0.62 + from_rest(t, 2.0) / kTourPeriod, 0.92, 0.76);
+}
+
+Se3d person_tracking_camera(double t) {
+  const double lag = 0.205 + 0.012 * wave(t, 4.3);
+  const Spot2 place = round_of_the_room(0.62 - lag + from_rest(t, 2.0) / kTourPeriod, 0.98, 0.80);
+  const Spot2 aim = tracked_person(t - 0.1) - place;
+  return handheld({place.x, place.y, 1.36 + 0.05 * wave(t, 5.0)},
+                  std::atan2(aim.y, aim.x) + 5.0 * kDegree * wave(t, 3.9), -5.0 * kDegree, t);
+}
+
+void person_tracking_movers(double t, World& world) {
+  const double rate = kTurn / kTourPeriod;
+  const double turn = kTurn * (0.62 + from_rest(t, 2.0) / kTourPeriod);
+  add_person(world, walk(tracked_person, t, {-0.2 * rate * std::sin(turn), 0.2 * rate * std::cos(turn)}), 4);
+}
+
+const Sway& synchronous_sway() {
+  static const Sway sway = {{-1.35, 0.0, 1.36}, {0.10, 0.44, 0.04}, {8.0, 6.4, 4.9}, 0, 3, 5.7, -6, 2, 4.7};
+  return sway;
+}
+
+Se3d synchronous_camera(double t) {
+  return sway_camera(synchronous_sway(), t);
+}
+
+void synchronous_movers(double t, World& world) {
+  const Spot2 offsets[2] = {{1.22, 0.34}, {1.36, -0.36}};
+  const Spot2 wings[2] = {{0.42, 1.10}, {0.42, -1.10}};
+  for (int who = 0; who < 2; ++who) {
+    const auto path = [&](double s) {
+      const Vec3d camera = sway_place(synchronous_sway(), s);
+      return Spot2{camera.x, camera.y} + mixed(wings[who], offsets[who], rise(0.8, 3.4, s));
+    };
+    add_person(world, walk(path, t, {-0.5, 0}), static_cast<uint32_t>(1 + 2 * who));
+  }
+}
+
+}  // namespace
+
+const std::vector<Scene>& all_scenes() {
+  static const std::vector<Scene> scenes = {
+      {"static", 10, false, furnished_room, no_movers, static_camera},
+      {"balloon", 12, true, furnished_room, balloon_movers, balloon_camera},
+      {"balloon_tracking", 12, true, furnished_room, balloon_tracking_movers, balloon_tracking_camera},
+      {"crowd", 12, true, furnished_room, crowd_movers, crowd_camera},
+      {"crowd_start", 12, true, furnished_room, crowd_start_movers, crowd_camera},
+      {"crowd_close", 12, true, bare_room, crowd_close_movers, crowd_close_camera},
+      {"moving_box", 12, true, furnished_room, moving_box_movers, moving_box_camera},
+      {"obstructing_box", 12, true, furnished_room, obstructing_movers, obstructing_camera},
+      {"placing_box", 14, true, furnished_with_stand, placing_movers, stand_camera},
+      {"removing_box", 13, true, furnished_with_stand, removing_movers, stand_camera},
+      {"placing_obstructing_box", 12, true, furnished_room, placing_obstructing_movers, stand_camera},
+      {"person_tracking", 14, true, furnished_room, person_tracking_movers, person_tracking_camera},
+      {"synchronous", 12, true, bare_room, synchronous_movers, synchronous_camera},
+      {"kidnapping_box", 14, true, bare_with_stand, kidnapping_movers, stand_camera},
+      {"loop", 20, false, furnished_room, no_movers, loop_camera},
+      {"fast", 10, false, furnished_room, no_movers, fast_camera}};
+  return scenes;
+}
+
+const Scene* find_scene(const std::string& name) {
+  for (const Scene& scene : all_scenes())
+    if (name == scene.name) return &scene;
+  return nullptr;
+}
+
+World world_at(const Scene& scene, double t_s, bool without_movers) {
+  World world;
+  scene.still(world);
+  if (!without_movers) scene.movers(t_s, world);
+  return world;
+}
+
+}  // namespace stillmap::synthetic
