@@ -1,7 +1,7 @@
 #pragma once
 
-// A subcommand is a file of this folder with one `add_NAME(app, exit_code)`: it declares its flags and, when it was
-// called for, runs and leaves its exit code. main.cpp lists them.
+// A subcommand is a file of this folder with one `add_NAME(app, exit_code)`: it declares its flags and, when
+// it was called for, runs and leaves its exit code. main.cpp lists them.
 
 #include <string>
 
@@ -16,7 +16,7 @@ namespace stillmap {
 /// Exit codes of the program; others rely on them.
 inline constexpr int kExitDone = 0;
 inline constexpr int kExitFailed = 1;    ///< went wrong while running
-inline constexpr int kExitUsage = 2;     ///< bad command line or configuration, or a part that is not in this build
+inline constexpr int kExitUsage = 2;     ///< bad usage or configuration, or a part that this build lacks
 inline constexpr int kExitNoSource = 3;  ///< the source cannot be opened
 inline constexpr int kExitLost = 4;      ///< tracking was lost and not found again before the end
 

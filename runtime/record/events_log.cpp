@@ -36,7 +36,7 @@ void EventsLog::line(Stamp stamp, std::string_view kind, std::string_view name, 
   std::string one_line(text);
   std::replace(one_line.begin(), one_line.end(), '\n', ' ');
   if (count == kMaxLinesPerName) one_line += " (further ones are counted only)";
-  file_.write(fmt::format("{} {} {}: {}\n", stamp_text(stamp), kind, name, one_line));
+  if (file_) file_->write(fmt::format("{} {} {}: {}\n", file_stamp(stamp), kind, name, one_line));
 }
 
 }  // namespace stillmap

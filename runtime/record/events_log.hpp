@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -17,6 +18,8 @@ class EventsLog {
  public:
   static constexpr uint32_t kMaxLinesPerName = 1000;
 
+  /// Counts only, writes nothing.
+  EventsLog() = default;
   static Result<EventsLog> create(const std::string& path);
 
   void info(Stamp stamp, std::string_view name, std::string_view text);
@@ -24,13 +27,16 @@ class EventsLog {
   void fault(Stamp stamp, std::string_view name, std::string_view text);
 
   const std::map<std::string, uint64_t, std::less<>>& faults() const { return faults_; }
-  OutputFile& file() { return file_; }
+  /// @return false when something could not be written, see error()
+  bool close() { return !file_ || file_->close(); }
+  bool failed() const { return file_ && file_->failed(); }
+  std::string error() const { return file_ ? file_->error() : std::string(); }
 
  private:
   explicit EventsLog(OutputFile file);
   void line(Stamp stamp, std::string_view kind, std::string_view name, std::string_view text);
 
-  OutputFile file_;
+  std::optional<OutputFile> file_;
   std::map<std::string, uint64_t, std::less<>> faults_, lines_;
 };
 

@@ -32,7 +32,7 @@ Result<StatesWriter> StatesWriter::create(const std::string& path) {
 StatesWriter::StatesWriter(OutputFile file) : file_(std::move(file)) {}
 
 bool StatesWriter::write(const FrameResult& r) {
-  std::string line = fmt::format("{},{},{:.4f},{:.4f},{:.4f}", stamp_text(r.stamp), to_string(r.state),
+  std::string line = fmt::format("{},{},{:.4f},{:.4f},{:.4f}", file_stamp(r.stamp), to_string(r.state),
                                  r.p_good, r.inlier_ratio, r.masked_fraction);
   for (const float c : r.covariance) fmt::format_to(std::back_inserter(line), ",{:.6g}", c);
   return file_.write(line + "\n");
@@ -50,7 +50,7 @@ TimingWriter::TimingWriter(OutputFile file) : file_(std::move(file)) {}
 
 bool TimingWriter::write(const FrameResult& r) {
   const StageTimes& ms = r.ms;
-  return file_.write(fmt::format("{},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f}\n", stamp_text(r.stamp),
+  return file_.write(fmt::format("{},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f}\n", file_stamp(r.stamp),
                                  ms.prepare_ms, ms.track_ms, ms.mask_ms, ms.refine_ms, ms.integrate_ms,
                                  ms.total_ms));
 }

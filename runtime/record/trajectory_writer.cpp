@@ -6,7 +6,7 @@
 
 namespace stillmap {
 
-std::string stamp_text(Stamp stamp) {
+std::string file_stamp(Stamp stamp) {
   constexpr int64_t kNsPerUs = 1000, kUsPerS = 1000000;
   // Rounded to the nearest microsecond, also below zero.
   const int64_t half = stamp.ns < 0 ? -kNsPerUs / 2 : kNsPerUs / 2;
@@ -18,7 +18,7 @@ std::string stamp_text(Stamp stamp) {
 std::string tum_line(Stamp stamp, const Se3d& T_map_cam) {
   const Vec3d& t = T_map_cam.translation;
   const Quatd q = quaternion_from(T_map_cam.rotation);
-  return fmt::format("{} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", stamp_text(stamp), t.x, t.y,
+  return fmt::format("{} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", file_stamp(stamp), t.x, t.y,
                      t.z, q.x, q.y, q.z, q.w);
 }
 

@@ -13,7 +13,7 @@ namespace stillmap {
 std::string tum_line(Stamp stamp, const Se3d& T_map_cam);
 
 /// `seconds.micros` of a stamp, as in all files and file names.
-std::string stamp_text(Stamp stamp);
+std::string file_stamp(Stamp stamp);
 
 /// Streams a trajectory. @thread one
 class TrajectoryWriter {

@@ -18,13 +18,13 @@ auto count_lines(const std::string& text) {
   return std::count(text.begin(), text.end(), '\n');
 }
 
-TEST(StampText, HasSixDigitsAndLosesNothingOfALargeStamp) {
-  EXPECT_EQ(stamp_text(Stamp{0}), "0.000000");
-  EXPECT_EQ(stamp_text(Stamp{1305031102175304000}), "1305031102.175304");
-  EXPECT_EQ(stamp_text(Stamp{999999600}), "1.000000");
-  EXPECT_EQ(stamp_text(Stamp{33333333}), "0.033333");
-  EXPECT_EQ(stamp_text(Stamp{-1500000000}), "-1.500000");
-  EXPECT_EQ(stamp_text(Stamp{-500}), "-0.000001");
+TEST(FileStamp, HasSixDigitsAndLosesNothingOfALargeStamp) {
+  EXPECT_EQ(file_stamp(Stamp{0}), "0.000000");
+  EXPECT_EQ(file_stamp(Stamp{1305031102175304000}), "1305031102.175304");
+  EXPECT_EQ(file_stamp(Stamp{999999600}), "1.000000");
+  EXPECT_EQ(file_stamp(Stamp{33333333}), "0.033333");
+  EXPECT_EQ(file_stamp(Stamp{-1500000000}), "-1.500000");
+  EXPECT_EQ(file_stamp(Stamp{-500}), "-0.000001");
 }
 
 TEST(TrajectoryWriter, WritesTumLines) {
@@ -86,7 +86,7 @@ TEST(EventsLog, CountsFaultsAndKeepsEachEventOnOneLine) {
   log->info(Stamp{0}, "start", "tum:x");
   log->fault(Stamp{1000000000}, "bad_frame", "a.png:\ntruncated");
   log->fault(Stamp{2000000000}, "bad_frame", "b.png");
-  ASSERT_TRUE(log->file().close());
+  ASSERT_TRUE(log->close());
   EXPECT_EQ(read_all(dir.path("events.log")),
             "0.000000 info start: tum:x\n1.000000 fault bad_frame: a.png: truncated\n"
             "2.000000 fault bad_frame: b.png\n");
@@ -100,7 +100,7 @@ TEST(EventsLog, AFaultInEveryFrameDoesNotFillTheDisk) {
   ASSERT_TRUE(log);
   for (uint32_t i = 0; i < EventsLog::kMaxLinesPerName + 500; ++i) log->fault(Stamp{0}, "bad_frame", "x");
   log->fault(Stamp{0}, "map_full", "y");
-  ASSERT_TRUE(log->file().close());
+  ASSERT_TRUE(log->close());
   EXPECT_EQ(count_lines(read_all(dir.path("events.log"))), EventsLog::kMaxLinesPerName + 1);
   EXPECT_EQ(log->faults().at("bad_frame"), EventsLog::kMaxLinesPerName + 500);
 }

@@ -1,0 +1,59 @@
+#include "firmware-like/commands/common.hpp"
+
+#include <cstdio>
+
+#include "config/load.hpp"
+#include "config/validate.hpp"
+#include "firmware-like/commands/command.hpp"
+
+namespace stillmap {
+
+int fail(const std::string& message, ErrorKind kind) {
+  std::fflush(stdout);
+  std::fprintf(stderr, "stillmap: %s\n", message.c_str());
+  switch (kind) {
+    case ErrorKind::failed:
+      return kExitFailed;
+    case ErrorKind::bad_usage:
+      return kExitUsage;
+    case ErrorKind::cannot_open:
+      return kExitNoSource;
+  }
+  return kExitFailed;
+}
+
+Result<Config> read_config(const std::string& path, const std::vector<std::string>& settings) {
+  Config config;
+  if (!path.empty()) {
+    auto loaded = load_config(path);
+    if (!loaded) return Error{loaded.error(), ErrorKind::bad_usage};
+    config = *loaded;
+  }
+  std::string problems;
+  for (const std::string& setting : settings)
+    if (const auto done = apply_setting(config, setting); !done)
+      problems += (problems.empty() ? "" : "\n  ") + ("--set " + setting + ": " + done.error());
+  if (!problems.empty()) return Error{problems, ErrorKind::bad_usage};
+  return config;
+}
+
+Result<Done> check(const Config& config) {
+  std::string text;
+  for (const std::string& violation : violations(config)) text += "\n  " + violation;
+  if (text.empty()) return Done{};
+  return Error{"the configuration cannot be used:" + text, ErrorKind::bad_usage};
+}
+
+FrameSlot::FrameSlot(const SourceInfo& info) {
+  const int32_t rows = info.camera.k.height, cols = info.camera.k.width;
+  const auto pixels = static_cast<size_t>(rows) * static_cast<size_t>(cols);
+  depth_.resize(pixels);
+  colour_.resize(pixels);
+  frame_.depth_raw = {depth_.data(), rows, cols, cols};
+  frame_.colour = {colour_.data(), rows, cols, cols};
+  if (!info.has_truth_mask) return;
+  truth_mask_.resize(pixels);
+  frame_.truth_mask = {truth_mask_.data(), rows, cols, cols};
+}
+
+}  // namespace stillmap

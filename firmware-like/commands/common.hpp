@@ -1,0 +1,37 @@
+#pragma once
+
+// What several subcommands do: read and check a configuration, open a source, hold one frame.
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "config/config.hpp"
+#include "config/result.hpp"
+#include "runtime/ports/frame_source.hpp"
+
+namespace stillmap {
+
+/// The configuration of a file ("": the defaults, which are config/presets/default.toml) with `settings`
+/// ("section.key=value") laid over it. Not yet checked.
+Result<Config> read_config(const std::string& path, const std::vector<std::string>& settings);
+
+/// @return an error of kind bad_usage that lists every violation, one a line
+Result<Done> check(const Config& config);
+
+/// Memory of one frame with the size that a source says.
+class FrameSlot {
+ public:
+  explicit FrameSlot(const SourceInfo& info);
+
+  RgbdFrame& frame() { return frame_; }
+
+ private:
+  std::vector<uint16_t> depth_;
+  std::vector<Rgb8> colour_;
+  std::vector<uint8_t> truth_mask_;
+  RgbdFrame frame_;
+};
+
+}  // namespace stillmap

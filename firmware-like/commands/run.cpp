@@ -1,0 +1,127 @@
+#include "firmware-like/commands/run.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <thread>
+
+#include "config/engine_params.hpp"
+#include "config/memory_plan.hpp"
+#include "drivers/registry.hpp"
+#include "firmware-like/commands/command.hpp"
+#include "firmware-like/commands/common.hpp"
+#include "firmware-like/commands/progress.hpp"
+#include "firmware-like/commands/run_loop.hpp"
+#include "firmware-like/commands/run_options.hpp"
+#include "firmware-like/commands/run_outputs.hpp"
+#include "firmware-like/commands/stop_signal.hpp"
+#include "runtime/core/heap_guard.hpp"
+
+namespace stillmap {
+namespace {
+
+/// Opens the source, waiting source.wait_s for it to appear.
+Result<std::unique_ptr<FrameSource>> open_waiting(const std::string& name, const Config& config) {
+  using Clock = std::chrono::steady_clock;
+  const auto start = Clock::now();
+  const double wait_s = static_cast<double>(config.source.wait_s);
+  while (true) {
+    auto source = open_source(name, source_options(config));
+    const double waited_s = std::chrono::duration<double>(Clock::now() - start).count();
+    const bool wait_on = wait_s < 0 || waited_s < wait_s;
+    if (source || source.error_kind() != ErrorKind::cannot_open || !wait_on || stop_requested())
+      return source;
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  }
+}
+
+/// Frames that will be read, -1 when nobody knows.
+int64_t expected_frames(const SourceInfo& info, const RunOptions& o) {
+  if (info.frames < 0) return o.max_frames > 0 ? o.max_frames : -1;
+  const int64_t left = std::max<int64_t>(info.frames - o.skip_frames, 0);
+  return o.max_frames > 0 ? std::min<int64_t>(left, o.max_frames) : left;
+}
+
+void print_summary(const RunOptions& o, const RunOutputs& outputs, const PipelineCounters& counters,
+                   double seconds) {
+  const Report& report = outputs.report();
+  fmt::print("{} frames in {:.1f} s; a frame takes {:.1f} ms (median), {:.1f} ms (95 %)\n", counters.frames,
+             seconds, report.total_ms().percentile(0.5), report.total_ms().percentile(0.95));
+  fmt::print("lost {}, skipped {}, masked {:.1f} % of the pixels on average, peak memory {:.0f} MB\n",
+             counters.lost_frames, outputs.fault_count("bad_frame"), 100 * report.masked_fraction_mean(),
+             static_cast<double>(peak_rss_bytes()) * 1e-6);
+  if (o.out.empty())
+    fmt::print("nothing was written; --out DIR keeps trajectory, mesh and report\n");
+  else
+    fmt::print("{0}/trajectory.txt, {0}/report.json{1}; `stillmap picture {0}` draws them\n", o.out,
+               outputs.mesh_triangles() > 0 ? fmt::format(", {}/mesh.ply ({} triangles in {:.1f} s)", o.out,
+                                                          outputs.mesh_triangles(), outputs.mesh_seconds())
+                                            : "");
+}
+
+int exit_code_of(const LoopEnd& end, const RunOutputs& outputs, const PipelineCounters& counters) {
+  if (!end.error.empty()) return fail(end.error, ErrorKind::failed);
+  if (outputs.failed()) return fail("not everything could be written, see above", ErrorKind::failed);
+  if (counters.frames == 0 && !stop_requested())
+    return fail("no frame of the source could be used", ErrorKind::failed);
+  if (end.state == TrackingState::lost) {
+    std::fprintf(stderr, "stillmap: tracking was lost and not found again before the end\n");
+    return kExitLost;
+  }
+  return kExitDone;
+}
+
+}  // namespace
+
+int run(const RunOptions& o) {
+  catch_stop_signals();
+  const auto plan = plan_run(o);
+  if (!plan) return fail(plan.error(), plan.error_kind());
+  const Config& config = plan->config;
+
+  auto opened = open_waiting(o.source, config);
+  if (!opened) return stop_requested() ? kExitDone : fail(opened.error(), opened.error_kind());
+  FrameSource& source = **opened;
+  source.skip(o.skip_frames);
+
+  const EngineParams params = engine_params(config, source.info().camera, source.info().depth_units_per_m);
+  const MemoryPlan memory = memory_plan(config, params.camera, params.depth_units_per_m);
+  if (const auto fits = check_budget(memory); !fits) return fail(fits.error(), fits.error_kind());
+  const std::unique_ptr<Engine> engine = make_cpu_engine(params);
+  if (!engine)
+    return fail(
+        fmt::format("the {} MB of the memory plan cannot be had from this machine; lower map.pool_blocks",
+                    memory.total_bytes / 1000000),
+        ErrorKind::failed);
+
+  SourceInfo info = source.info();
+  info.camera = params.camera;
+  const int64_t frames = expected_frames(info, o);
+  auto outputs =
+      RunOutputs::create(o.out, config, info, frames, Report("cpu", params.threads, memory.total_bytes));
+  if (!outputs) return fail(outputs.error(), ErrorKind::failed);
+  (*outputs)->event(Stamp{}, "start", fmt::format("{}, cpu engine, {} threads", info.name, params.threads));
+
+  FrameSlot slot(info);
+  Pipeline pipeline(*engine, config, plan->T_map_cam);
+  Progress progress(frames, o.quiet);
+  const LoopEnd end = run_loop(source, *engine, pipeline, **outputs, progress, slot.frame(), o.max_frames);
+  const double seconds = progress.seconds();
+  (*outputs)->finish(*engine, source, pipeline.counters());
+  if (!o.quiet) print_summary(o, **outputs, pipeline.counters(), seconds);
+  std::fflush(stdout);
+  return exit_code_of(end, **outputs, pipeline.counters());
+}
+
+void add_run(CLI::App& app, int& exit_code) {
+  CLI::App* command = app.add_subcommand("run", "track and map a camera or a recording");
+  auto options = std::make_shared<RunOptions>();
+  declare_run_flags(*command, *options);
+  command->callback([options, &exit_code] { exit_code = run(*options); });
+}
+
+}  // namespace stillmap

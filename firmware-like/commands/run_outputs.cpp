@@ -1,0 +1,212 @@
+#include "firmware-like/commands/run_outputs.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cstdio>
+#include <utility>
+
+#include "config/describe.hpp"
+#include "runtime/image/image_file.hpp"
+#include "runtime/record/output_file.hpp"
+#include "runtime/record/ply_writer.hpp"
+
+namespace stillmap {
+namespace {
+
+template <class Writer>
+std::string error_of(const Result<Writer>& result) {
+  return result ? std::string() : result.error();
+}
+
+}  // namespace
+
+RunOutputs::RunOutputs(const Config& config, const SourceInfo& source, int64_t frames, Report report)
+    : record_(config.record), config_(config), source_(source), frames_(frames), report_(std::move(report)) {
+  const Intrinsics& k = source.camera.k;
+  if (record_.snapshots == 0) return;
+  raycast_depth_.resize(static_cast<size_t>(k.width) * static_cast<size_t>(k.height));
+  raycast_colour_.resize(raycast_depth_.size());
+}
+
+Result<std::unique_ptr<RunOutputs>> RunOutputs::create(const std::string& dir, const Config& config,
+                                                       const SourceInfo& source, int64_t frames,
+                                                       Report report) {
+  std::unique_ptr<RunOutputs> outputs(new RunOutputs(config, source, frames, std::move(report)));
+  if (dir.empty()) return outputs;
+  if (const std::string error = outputs->open(dir); !error.empty()) return Error{error};
+  return outputs;
+}
+
+std::string RunOutputs::open(const std::string& dir) {
+  auto folder = RunFolder::open(dir, record_.keep_previous);
+  if (!folder) return folder.error();
+  auto trajectory = TrajectoryWriter::create(folder->path("trajectory.txt"));
+  auto states = StatesWriter::create(folder->path("states.csv"));
+  auto timing = TimingWriter::create(folder->path("timing.csv"));
+  auto events = EventsLog::create(folder->path("events.log"));
+  for (const std::string& error :
+       {error_of(trajectory), error_of(states), error_of(timing), error_of(events)})
+    if (!error.empty()) return error;
+  std::vector<std::string> inner;
+  if (record_.masks) inner.emplace_back("masks");
+  if (record_.masks && source_.has_truth_mask) inner.emplace_back("masks_truth");
+  if (record_.snapshots > 0) inner.emplace_back("snapshots");
+  for (const std::string& name : inner)
+    if (std::string error = folder->make(name); !error.empty()) return error;
+  if (std::string error = write_whole_file(folder->path("config.toml"), to_toml(config_)); !error.empty())
+    return error;
+  events_ = std::move(*events);
+  files_.emplace(
+      Files{std::move(*folder), std::move(*trajectory), std::move(*states), std::move(*timing), {}});
+  return {};
+}
+
+void RunOutputs::tell(const std::string& error) {
+  if (error.empty() || !told_.insert(error).second) return;
+  std::fprintf(stderr, "stillmap: %s\n", error.c_str());
+  events_.fault(last_stamp_, "record_failed", error);
+}
+
+void RunOutputs::add(const RgbdFrame& frame, const FrameResult& result, Engine& engine) {
+  const double period_s =
+      frames_seen_ == 0 ? 0 : static_cast<double>(result.stamp.ns - last_stamp_.ns) * 1e-9;
+  last_stamp_ = result.stamp;
+  report_.add(result, period_s);
+  note_changes(result);
+  if (files_) {
+    files_->trajectory.write(result.stamp, result.T_map_cam);
+    files_->states.write(result);
+    files_->timing.write(result);
+    add_truth(frame, result);
+    if (result.status != Status::bad_data) add_images(frame, result, engine);
+    for (const OutputFile* file :
+         {&files_->trajectory.file(), &files_->states.file(), &files_->timing.file()})
+      tell(file->error());
+    tell(events_.error());
+  }
+  last_ = result;
+  ++frames_seen_;
+}
+
+void RunOutputs::note_changes(const FrameResult& r) {
+  if (r.status == Status::bad_data)
+    events_.fault(
+        r.stamp, "bad_frame",
+        fmt::format("frame {}: fewer valid depth pixels than depth.min_valid_pixels; not used", r.sequence));
+  if (r.state == TrackingState::lost && last_.state != TrackingState::lost)
+    events_.fault(r.stamp, "tracking_lost",
+                  fmt::format("frame {}: inlier ratio {:.2f}", r.sequence, r.inlier_ratio));
+  if (r.state != TrackingState::lost && r.state != last_.state)
+    events_.info(r.stamp, "tracking", fmt::format("frame {}: {}", r.sequence, to_string(r.state)));
+  const auto given_up = [](const MapHealth& m) { return m.dropped_blocks + m.table_full + m.pool_empty; };
+  if (given_up(r.map) > given_up(last_.map))
+    events_.fault(r.stamp, "map_full",
+                  fmt::format("{} far blocks dropped, {} insertions refused so far; raise map.pool_blocks",
+                              r.map.dropped_blocks, r.map.table_full + r.map.pool_empty));
+}
+
+void RunOutputs::add_truth(const RgbdFrame& frame, const FrameResult& result) {
+  if (!frame.truth_T_world_cam) return;
+  if (!truth_.anchored() && result.status != Status::bad_data)
+    truth_.anchor(result.T_map_cam, *frame.truth_T_world_cam);
+  if (!truth_.anchored()) return;
+  if (!files_->truth) {
+    auto writer = TrajectoryWriter::create(files_->folder.path("truth.txt"));
+    if (!writer) return tell(writer.error());
+    files_->truth.emplace(std::move(*writer));
+  }
+  files_->truth->write(result.stamp, truth_.to_map(*frame.truth_T_world_cam));
+  tell(files_->truth->file().error());
+}
+
+bool RunOutputs::snapshot_due() {
+  // The last frame is one of them, the first is not: its map is the frame itself.
+  if (frames_ <= 0 || snapshots_taken_ >= record_.snapshots) return false;
+  return frames_seen_ + 1 >= (snapshots_taken_ + 1) * frames_ / record_.snapshots;
+}
+
+void RunOutputs::add_images(const RgbdFrame& frame, const FrameResult& result, Engine& engine) {
+  if (!images_) return;
+  const std::string name = file_stamp(result.stamp) + ".png";
+  std::string error;
+  if (record_.masks)
+    error = error_of(write_png_grey(files_->folder.path("masks/" + name), engine.mask_image()));
+  if (error.empty() && record_.masks && source_.has_truth_mask)
+    error = error_of(write_png_grey(files_->folder.path("masks_truth/" + name), frame.truth_mask));
+  if (!error.empty()) {
+    tell(error + "; no further images are written");
+    images_ = false;
+    return;
+  }
+  if (snapshot_due()) add_snapshot(result, engine);
+}
+
+void RunOutputs::add_snapshot(const FrameResult& result, Engine& engine) {
+  const Intrinsics& k = source_.camera.k;
+  const ImageView<Rgb8> colour{raycast_colour_.data(), k.height, k.width, k.width};
+  const std::string path = files_->folder.path("snapshots/" + file_stamp(result.stamp));
+  ++snapshots_taken_;
+  const ImageView<float> depth_m{raycast_depth_.data(), k.height, k.width, k.width};
+  if (engine.raycast(cast<float>(result.T_map_cam), k, depth_m, colour) != Status::ok) return;
+  for (const std::string& error : {error_of(write_png(path + "_colour.png", engine.colour_image())),
+                                   error_of(write_png_grey(path + "_mask.png", engine.mask_image())),
+                                   error_of(write_png(path + "_map.png", colour))}) {
+    if (error.empty()) continue;
+    tell(error + "; no further images are written");
+    images_ = false;
+    return;
+  }
+}
+
+void RunOutputs::bad_frame(Stamp stamp, const std::string& why) {
+  events_.fault(stamp, "bad_frame", why);
+  constexpr uint64_t kPrinted = 10;
+  const uint64_t count = fault_count("bad_frame");
+  if (count <= kPrinted) std::fprintf(stderr, "stillmap: frame skipped: %s\n", why.c_str());
+  if (count == kPrinted)
+    std::fprintf(stderr, "stillmap: further skipped frames go to events.log and report.json only\n");
+}
+
+void RunOutputs::rewrite_report(const PipelineCounters& counters) {
+  report_.set_counters(counters);
+  report_.set_faults(events_.faults());
+  if (files_) tell(write_whole_file(files_->folder.path("report.json"), report_.json()));
+}
+
+void RunOutputs::write_mesh(Engine& engine) {
+  const auto start = std::chrono::steady_clock::now();
+  PlyWriter writer(files_->folder.path("mesh.ply"));
+  const Status status = engine.extract_mesh(writer);
+  if (!writer.close()) return tell(writer.error());
+  if (status != Status::ok)
+    tell(files_->folder.path("mesh.ply") + ": the mesh could not be extracted: " + to_string(status));
+  mesh_seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  mesh_triangles_ = writer.triangle_count();
+  events_.info(last_stamp_, "mesh",
+               fmt::format("{} vertices, {} triangles in {:.2f} s", writer.vertex_count(), mesh_triangles_,
+                           mesh_seconds_));
+}
+
+void RunOutputs::finish(Engine& engine, const FrameSource& source, const PipelineCounters& counters) {
+  report_.set_map(engine.map_health());
+  if (files_) {
+    if (record_.mesh) write_mesh(engine);
+    if (const auto cloud = source.truth_cloud(); !cloud.empty() && truth_.anchored())
+      tell(write_point_cloud(files_->folder.path("truth_cloud.ply"), in_map_frame(truth_, cloud)));
+  }
+  events_.info(last_stamp_, "stop", fmt::format("{} frames", counters.frames));
+  rewrite_report(counters);
+  if (!files_) return;
+  for (OutputFile* file : {&files_->trajectory.file(), &files_->states.file(), &files_->timing.file()})
+    if (!file->close()) tell(file->error());
+  if (files_->truth && !files_->truth->file().close()) tell(files_->truth->file().error());
+  if (!events_.close()) tell(events_.error());
+}
+
+uint64_t RunOutputs::fault_count(const std::string& name) const {
+  const auto it = events_.faults().find(name);
+  return it == events_.faults().end() ? 0 : it->second;
+}
+
+}  // namespace stillmap

@@ -1,0 +1,34 @@
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <string>
+
+#include "firmware-like/commands/command.hpp"
+#include "runtime/core/version.hpp"
+
+int main(int argc, char** argv) {
+  using namespace stillmap;
+  CLI::App app("Tracks an RGB-D camera, throws out whatever moves and maps what stands still.", "stillmap");
+  app.set_version_flag("--version", std::string("stillmap ") + version());
+  app.require_subcommand(1);
+  app.footer("`stillmap SUBCOMMAND --help` explains the flags of each.");
+
+  int exit_code = kExitDone;
+  add_run(app, exit_code);
+  add_evaluate(app, exit_code);
+  add_picture(app, exit_code);
+  add_render(app, exit_code);
+  add_bench(app, exit_code);
+  add_memory_plan(app, exit_code);
+  add_check_config(app, exit_code);
+  add_parts_not_built(app, exit_code);
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kExitDone : kExitUsage;
+  } catch (const std::exception& error) {  // what no border caught: memory, a defect
+    return fail(error.what(), ErrorKind::failed);
+  }
+  return exit_code;
+}

@@ -1,0 +1,111 @@
+// The real-time loop and the workers of the engine do not allocate: operator new is counted by the heap
+// guard, and the C allocators are hooked here, in every thread.
+
+#include <gtest/gtest.h>
+#include <malloc.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "config/engine_params.hpp"
+#include "drivers/registry.hpp"
+#include "runtime/core/heap_guard.hpp"
+#include "runtime/pipeline/pipeline.hpp"
+
+extern "C" {
+void* __libc_malloc(size_t);
+void* __libc_calloc(size_t, size_t);
+void* __libc_realloc(void*, size_t);
+void* __libc_memalign(size_t, size_t);
+
+void* malloc(size_t bytes) {
+  stillmap::heap_guard::note();
+  return __libc_malloc(bytes);
+}
+void* calloc(size_t count, size_t bytes) {
+  stillmap::heap_guard::note();
+  return __libc_calloc(count, bytes);
+}
+void* realloc(void* memory, size_t bytes) {
+  stillmap::heap_guard::note();
+  return __libc_realloc(memory, bytes);
+}
+void* aligned_alloc(size_t alignment, size_t bytes) {
+  stillmap::heap_guard::note();
+  return __libc_memalign(alignment, bytes);
+}
+void* memalign(size_t alignment, size_t bytes) {
+  stillmap::heap_guard::note();
+  return __libc_memalign(alignment, bytes);
+}
+int posix_memalign(void** memory, size_t alignment, size_t bytes) {
+  stillmap::heap_guard::note();
+  *memory = __libc_memalign(alignment, bytes);
+  return *memory == nullptr ? ENOMEM : 0;
+}
+}
+
+namespace stillmap {
+namespace {
+
+/// Allocations that `work` makes, in any thread.
+template <class Work>
+uint64_t allocations_of(Work work) {
+  const uint64_t before = heap_guard::allocations();
+  heap_guard::arm();
+  work();
+  heap_guard::disarm();
+  return heap_guard::allocations() - before;
+}
+
+TEST(HeapGuard, SeesEveryWayToAllocateInEveryThread) {
+  void* volatile kept = nullptr;  // keeps the compiler from leaving the allocation out
+  EXPECT_GE(allocations_of([&] { kept = ::operator new(10); }), 1u);
+  ::operator delete(kept);
+  EXPECT_GE(allocations_of([&] { kept = std::malloc(10); }), 1u);
+  std::free(kept);
+  EXPECT_GE(allocations_of([&] { kept = std::calloc(1, 10); }), 1u);
+  EXPECT_GE(allocations_of([&] { kept = std::realloc(kept, 1000); }), 1u);
+  std::free(kept);
+  EXPECT_GE(allocations_of([&] { kept = std::aligned_alloc(64, 64); }), 1u);
+  std::free(kept);
+  uint64_t in_thread = 0;
+  std::thread worker([&] { in_thread = allocations_of([&] { kept = std::malloc(10); }); });
+  worker.join();
+  std::free(kept);
+  EXPECT_GE(in_thread, 1u);
+  EXPECT_EQ(allocations_of([] {}), 0u);
+}
+
+TEST(Pipeline, DoesNotAllocateIn300FramesWorkersIncluded) {
+  Config config;
+  config.map.pool_blocks = 60000;
+  auto source = open_source("synthetic:crowd,size=160x120,seconds=11", source_options(config));
+  ASSERT_TRUE(source) << source.error();
+  const SourceInfo& info = (*source)->info();
+  const std::unique_ptr<Engine> engine =
+      make_cpu_engine(engine_params(config, info.camera, info.depth_units_per_m));
+  ASSERT_NE(engine, nullptr);
+  std::vector<uint16_t> depth(160 * 120);
+  std::vector<Rgb8> colour(160 * 120);
+  std::vector<uint8_t> mask(160 * 120);
+  RgbdFrame frame;
+  frame.depth_raw = {depth.data(), 120, 160, 160};
+  frame.colour = {colour.data(), 120, 160, 160};
+  frame.truth_mask = {mask.data(), 120, 160, 160};
+  Pipeline pipeline(*engine, config);
+  uint64_t allocations = 0;
+  for (int i = 0; i < 300; ++i) {
+    ASSERT_EQ((*source)->next(frame, 1000), Status::ok) << (*source)->error();
+    allocations += allocations_of([&] { pipeline.process(frame); });
+  }
+  EXPECT_EQ(allocations, 0u);
+  EXPECT_EQ(pipeline.counters().frames, 300u);
+  EXPECT_GT(engine->map_health().blocks, 100u);  // it did map
+}
+
+}  // namespace
+}  // namespace stillmap

@@ -1,0 +1,84 @@
+#!/usr/bin/env bash
+# Installs what is missing, builds, runs every test that this machine can run:
+#   format, release build with all tests, unit tests under AddressSanitizer + UBSan, the thread pool's under
+#   ThreadSanitizer.  --tidy: clang-tidy over the whole tree as well (minutes).
+# A part that passed is not repeated until a source file changes.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+tidy=no
+case "${1:-}" in
+  '') ;;
+  --tidy) tidy=yes ;;
+  *) echo "test.sh: unknown argument '$1'; only --tidy is known" >&2; exit 2 ;;
+esac
+
+toolchain/setup.sh --lint
+start=$SECONDS
+parts=0
+failed=()
+
+# The state of every source file, and of the recordings that the system tests look at.
+fingerprint() {
+  {
+    find . \( -path ./build -o -path ./out -o -path ./.git -o -name __pycache__ \) -prune -o -type f -print0 |
+      sort -z | xargs -0 sha256sum
+    ls -d ../shared/data/*/ 2>/dev/null || true
+  } | sha256sum | cut -d' ' -f1
+}
+state=$(fingerprint)
+
+# part NAME COMMAND...: runs it unless it passed for this very state of the files.
+part() {
+  local name=$1; shift
+  parts=$((parts + 1))
+  mkdir -p build/passed
+  if [[ "$(cat "build/passed/$name" 2>/dev/null || true)" == "$state" ]]; then
+    echo "== $name: passed before, nothing has changed"
+    return
+  fi
+  echo "== $name"
+  local from=$SECONDS
+  if "$@"; then
+    echo "$state" >"build/passed/$name"
+    echo "== $name: passed in $((SECONDS - from)) s"
+  else
+    rm -f "build/passed/$name"
+    failed+=("$name")
+    echo "== $name: FAILED"
+  fi
+}
+
+jobs=$(nproc)
+configure() { [[ -f build/$1/build.ninja ]] || cmake --preset "$1" >/dev/null; }
+build() { configure "$1" && cmake --build "build/$1" -j "$jobs" ${2:+--target "$2"}; }
+
+check_format() {
+  find kernels config runtime drivers firmware-like tests \( -name '*.[ch]pp' -o -name '*.cu' -o -name '*.cuh' \) \
+    -print0 | xargs -0 clang-format-14 --dry-run -Werror
+}
+release_tests() {
+  build release && ctest --test-dir build/release --output-on-failure -j "$jobs"
+}
+asan_tests() {
+  build asan unit_tests &&
+    ASAN_OPTIONS=detect_stack_use_after_return=1:strict_string_checks=1 UBSAN_OPTIONS=print_stacktrace=1 \
+      ctest --test-dir build/asan --output-on-failure -j "$jobs" -L unit
+}
+tsan_tests() {
+  build tsan thread_tests &&
+    TSAN_OPTIONS=halt_on_error=1 ctest --test-dir build/tsan --output-on-failure -L threads
+}
+tidy_tree() { configure tidy && cmake --build build/tidy -j "$jobs"; }
+
+part format check_format
+part release release_tests
+part asan asan_tests
+part tsan tsan_tests
+[[ $tidy == no ]] || part tidy tidy_tree
+
+echo
+passed=$((parts - ${#failed[@]}))
+echo "$((100 * passed / parts))% tests passed, ${#failed[@]} tests failed out of $parts${failed[*]:+: ${failed[*]}}"
+echo "Total Test time (real) = $((SECONDS - start)) sec"
+[[ ${#failed[@]} -eq 0 ]]
