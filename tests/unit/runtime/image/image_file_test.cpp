@@ -257,7 +257,7 @@ TEST(ImageFile, MutatedFilesNeverCrash) {
   int refused = 0;
   for (int round = 0; round < 1500; ++round) {
     std::string bytes = seeds[round % 3];
-    for (uint32_t change = 0, changes = 1 + random() % 4; change < changes; ++change)
+    for (size_t change = 0, changes = 1 + random() % 4; change < changes; ++change)
       bytes[random() % bytes.size()] = static_cast<char>(random());
     test::write_text(dir / "mutated", bytes);
     const Result<Done> as_depth = read_png16(dir / "mutated", depth.view());

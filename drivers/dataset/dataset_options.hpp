@@ -1,0 +1,17 @@
+#pragma once
+
+#include <optional>
+
+#include "kernels/base/pinhole.hpp"
+
+namespace stillmap {
+
+/// What the person who opens a recording knows better than its folder.
+struct DatasetOptions {
+  std::optional<CameraModel> camera;  ///< wins over every file; width and height are not looked at
+  float depth_units_per_m = 0;        ///< wins over every file; 0: not given
+  double time_offset_ms = 0;          ///< added to the colour stamps before pairing
+  double max_pair_ms = 20;            ///< largest distance of the stamps of a pair, >= 0
+};
+
+}  // namespace stillmap

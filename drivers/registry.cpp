@@ -1,0 +1,69 @@
+#include "drivers/registry.hpp"
+
+#include "drivers/dataset/sevenscenes_source.hpp"
+#include "drivers/dataset/tum_source.hpp"
+#include "drivers/synthetic/synthetic_source.hpp"
+
+namespace stillmap {
+namespace {
+
+using Opened = Result<std::unique_ptr<FrameSource>>;
+
+/// How one scheme is opened; `open` is null where this build lacks the part.
+struct Scheme {
+  const char* name;
+  const char* usage;
+  Opened (*open)(const std::string& rest, const SourceOptions& options);
+};
+
+Opened tum(const std::string& dir, const SourceOptions& options) {
+  return open_tum(dir, options.dataset);
+}
+
+Opened sevenscenes(const std::string& dir, const SourceOptions& options) {
+  return open_sevenscenes(dir, options.dataset);
+}
+
+Opened synthetic(const std::string& spec, const SourceOptions& options) {
+  Opened source = open_synthetic(spec, options.threads);
+  if (!source) return Error{source.error(), ErrorKind::bad_usage};  // nothing outside the program can fail it
+  return source;
+}
+
+constexpr Scheme kSchemes[] = {
+    {"tum", "tum:DIR", tum},
+    {"sevenscenes", "sevenscenes:DIR", sevenscenes},
+    {"synthetic", "synthetic:SCENE[,seed=N][,size=WxH][,seconds=S]", synthetic},
+    {"xtion", "xtion[:SERIAL]", nullptr},
+    {"oni", "oni:FILE", nullptr},
+    {"v4l2", "v4l2:DEPTH_DEV[,COLOUR_DEV]", nullptr},
+    {"log", "log:FILE", nullptr},
+};
+
+std::string schemes_of_this_build() {
+  std::string text;
+  for (const Scheme& scheme : kSchemes)
+    if (scheme.open) text += std::string(text.empty() ? "" : ", ") + scheme.usage;
+  return text;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<FrameSource>> open_source(const std::string& source, const SourceOptions& options) {
+  const auto refused = [&](const std::string& why) {
+    return Error{"source '" + source + "': " + why + "; this build has " + schemes_of_this_build(),
+                 ErrorKind::bad_usage};
+  };
+  const size_t colon = source.find(':');
+  const std::string name = source.substr(0, colon);
+  const std::string rest = colon == std::string::npos ? "" : source.substr(colon + 1);
+  for (const Scheme& scheme : kSchemes) {
+    if (name != scheme.name) continue;
+    if (!scheme.open) return refused(std::string(scheme.usage) + " is not part of this build");
+    if (rest.empty()) return refused(std::string("expected ") + scheme.usage);
+    return scheme.open(rest, options);
+  }
+  return refused("there is no such kind of source");
+}
+
+}  // namespace stillmap

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "config/result.hpp"
+#include "drivers/dataset/dataset_options.hpp"
+#include "runtime/ports/frame_source.hpp"
+
+namespace stillmap {
+
+struct SourceOptions {
+  DatasetOptions dataset;  ///< for recordings
+  int threads = 2;         ///< 1..64, of a source that computes its frames, the calling thread included
+};
+
+/// Makes the source that `source` names: `SCHEME:REST` as on the command line (--source).
+/// @return kind bad_usage: no such scheme, a part that this build lacks, unknown intrinsics, a wrong
+/// description of a
+///         scene; kind cannot_open: the source is not there or cannot be read
+/// @thread boot
+Result<std::unique_ptr<FrameSource>> open_source(const std::string& source, const SourceOptions& options);
+
+}  // namespace stillmap

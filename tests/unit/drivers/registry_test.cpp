@@ -1,0 +1,68 @@
+#include "drivers/registry.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/tiny_dataset.hpp"
+
+namespace stillmap {
+namespace {
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+void expect_refused(const std::string& source, ErrorKind kind, const std::string& message) {
+  const Result<std::unique_ptr<FrameSource>> opened = open_source(source, {});
+  ASSERT_FALSE(opened) << source;
+  EXPECT_EQ(opened.error_kind(), kind) << opened.error();
+  EXPECT_TRUE(contains(opened.error(), message)) << opened.error();
+}
+
+TEST(Registry, OpensRecordings) {
+  const test::TempDir dir;
+  test::write_tum_images(dir, 1);
+  test::write_text(dir / "associated.txt", "1.0 depth/0.png 1.0 rgb/0.png\n");
+  test::write_sevenscenes_frame(dir, 0);
+  SourceOptions options;
+  options.dataset.camera = CameraModel{{20, 20, 8, 6, 0, 0}, {}};
+  for (const char* scheme : {"tum:", "sevenscenes:"}) {
+    const Result<std::unique_ptr<FrameSource>> source = open_source(scheme + dir.path(), options);
+    ASSERT_TRUE(source) << source.error();
+    EXPECT_EQ((*source)->info().name, scheme + dir.path());
+    test::FrameBuffer buffer((*source)->info());
+    EXPECT_EQ((*source)->next(buffer.frame, 0), Status::ok) << (*source)->error();
+  }
+}
+
+TEST(Registry, OpensSyntheticScenes) {
+  const Result<std::unique_ptr<FrameSource>> source =
+      open_source("synthetic:static,size=64x48,seconds=1", {});
+  ASSERT_TRUE(source) << source.error();
+  EXPECT_EQ((*source)->info().camera.k.width, 64);
+  expect_refused("synthetic:no_such_scene", ErrorKind::bad_usage, "no_such_scene");
+}
+
+TEST(Registry, UnknownSchemesListTheValidOnes) {
+  for (const char* source : {"", ":", "nothing", "nothing:here", "TUM:dir", "/some/folder"}) {
+    expect_refused(source, ErrorKind::bad_usage, "tum:DIR, sevenscenes:DIR, synthetic:SCENE");
+  }
+}
+
+TEST(Registry, SchemesOfOtherBuildsSaySo) {
+  for (const char* source : {"xtion", "xtion:123", "oni:a.oni", "v4l2:/dev/video0", "log:a.lcm"})
+    expect_refused(source, ErrorKind::bad_usage, "is not part of this build");
+}
+
+TEST(Registry, SchemesWithoutTheRestSayWhatIsExpected) {
+  expect_refused("tum", ErrorKind::bad_usage, "expected tum:DIR");
+  expect_refused("tum:", ErrorKind::bad_usage, "expected tum:DIR");
+  expect_refused("synthetic:", ErrorKind::bad_usage, "expected synthetic:SCENE");
+}
+
+TEST(Registry, MissingFoldersCannotBeOpened) {
+  expect_refused("tum:/no/such/folder", ErrorKind::cannot_open, "/no/such/folder");
+  expect_refused("sevenscenes:/no/such/folder", ErrorKind::cannot_open, "/no/such/folder");
+}
+
+}  // namespace
+}  // namespace stillmap
