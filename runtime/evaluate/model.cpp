@@ -162,6 +162,13 @@ DistanceSummary summarise(const std::vector<Distances>& distances, float Distanc
   return summary;
 }
 
+void thin(std::vector<Vec3>& vertices, uint64_t limit) {
+  if (vertices.size() <= limit || limit == 0) return;
+  const std::size_t stride = (vertices.size() + limit - 1) / limit;
+  for (std::size_t i = 0; i * stride < vertices.size(); ++i) vertices[i] = vertices[i * stride];
+  vertices.resize((vertices.size() + stride - 1) / stride);
+}
+
 Result<ModelResult> evaluate_loaded(const std::string& truth_ply, PlyMesh mesh, const ModelOptions& options) {
   Box box;
   for (Vec3& p : mesh.vertices_m) {
@@ -212,6 +219,7 @@ Result<ModelResult> evaluate_model(const std::string& truth_ply, const std::stri
     if (mesh->vertices_m.empty())
       return Error{fmt::format("{}: holds no vertices, nothing to evaluate", mesh_ply)};
     mesh->triangles = {};
+    thin(mesh->vertices_m, options.max_vertices);
     return evaluate_loaded(truth_ply, std::move(*mesh), options);
   } catch (const std::bad_alloc&) {
     return Error{

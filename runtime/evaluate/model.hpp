@@ -40,8 +40,9 @@ struct ModelResult {
 struct ModelOptions {
   Se3d T_truth_mesh;  ///< mesh to truth
   uint64_t max_truth_points =
-      20'000'000;       ///< bounds memory (about 30 bytes each); above it the cloud is thinned
-  int32_t threads = 0;  ///< 0: as many as the machine has
+      20'000'000;                      ///< bounds memory (about 30 bytes each); above it the cloud is thinned
+  uint64_t max_vertices = UINT64_MAX;  ///< of a larger mesh every n-th vertex is measured
+  int32_t threads = 0;                 ///< 0: as many as the machine has
 };
 
 /// Truth farther than 0.5 m from the mesh's box is not loaded.

@@ -147,7 +147,8 @@ std::optional<Stamp> parse_stamp(std::string_view text) {
 }
 
 double exact_seconds(Stamp stamp) {
-  return static_cast<double>(static_cast<long double>(stamp.ns) / 1e9L);
+  // By way of the text: dividing in any wider type rounds twice and misses now and then.
+  return parse_number(stamp_text(stamp)).value_or(0);
 }
 
 std::string stamp_text(Stamp stamp) {
