@@ -127,7 +127,7 @@ float light(Vec3 p, Vec3 normal) {
   const float distance2 = dot(to_lamp, to_lamp);
   const float lamp = larger(dot(normal, to_lamp), 0.0f) / std::sqrt(distance2 + 1e-4f);
   const float window = larger(dot(normal, kWindowDirection), 0.0f);
-  return 0.42f + 0.6f * lamp / (1.0f + 0.1f * distance2) + 0.16f * window + 0.05f * normal.z;
+  return 0.45f + 0.7f * lamp / (1.0f + 0.1f * distance2) + 0.16f * window + 0.05f * normal.z;
 }
 
 uint8_t to_byte(float v) {

@@ -12,9 +12,10 @@ namespace stillmap::synthetic {
 namespace {
 
 constexpr Spot2 kToCamera = {-0.25, 0.0};
-constexpr Spot2 kNorthWing = {-0.85, 0.98};  // out of view beside the camera
+constexpr Spot2 kNorthWing = {-0.80, 0.98};  // out of view beside the camera
 constexpr Spot2 kSouthWing = {-0.85, -1.10};
 constexpr Spot2 kSouthCorner = {-1.25, -1.40};
+constexpr Spot2 kWideSouthWing = {-0.60, -1.18};  // for who carries something
 
 const Material kCarton = {Pattern::poster, {176, 134, 90}, {210, 180, 140}, 0.11f, 21};
 const Material kBigCarton = {Pattern::cloud, {150, 112, 74}, {196, 158, 112}, 0.09f, 22};
@@ -181,7 +182,7 @@ Se3d crowd_close_camera(double t) {
 }
 
 void crowd_close_movers(double t, World& world) {
-  const Spot2 wings[3] = {{-1.0, 1.15}, {-1.0, -1.2}, {-1.5, -1.5}};
+  const Spot2 wings[3] = {{-0.85, 1.15}, {-0.9, -1.25}, {-1.4, -1.55}};
   const double from[3] = {0.8, 1.6, 1.5}, to[3] = {3.2, 4.2, 4.4};
   for (int who = 0; who < 3; ++who) {
     const auto path = [&](double s) {
@@ -205,7 +206,7 @@ Se3d moving_box_camera(double t) {
 void moving_box_movers(double t, World& world) {
   const auto path = [](double s) {
     const double slow = from_rest(std::max(0.0, s - 1.0), 2.0);
-    return mixed(kNorthWing, Spot2{0.22 + 0.16 * wave(slow, 6.9), 0.50 * wave(slow, 7.4, 0.2)},
+    return mixed(kWideSouthWing, Spot2{0.22 + 0.16 * wave(slow, 6.9), 0.50 * wave(slow, 7.4, 0.2)},
                  rise(0.9, 3.6, s));
   };
   Stance person = walk(path, t, {-0.8, 0});
@@ -294,9 +295,13 @@ Spot2 stroll(double t) {
 void placing_movers(double t, World& world) {
   const Spot2 before_stand = {kStand.x - 0.02, kStand.y - 0.58};
   const auto path = [&](double s) {
-    static const std::array<Waypoint, 4> way = {
-        {{0.8, kSouthWing}, {2.4, {-0.20, -0.62}}, {3.9, {0.30, -0.70}}, {4.9, before_stand}}};
-    return mixed(along(way, s), stroll(s - 6.0), rise(6.4, 8.6, s));
+    static const std::array<Waypoint, 6> way = {{{0.8, kWideSouthWing},
+                                                 {2.4, {-0.20, -0.62}},
+                                                 {3.9, {0.30, -0.70}},
+                                                 {4.9, before_stand},
+                                                 {6.3, before_stand},
+                                                 {7.6, {-0.20, -0.55}}}};
+    return mixed(along(way, s), stroll(s - 7.2), rise(7.0, 8.8, s));
   };
   const double turned = rise(4.0, 5.0, t) * (1.0 - rise(6.4, 7.2, t));
   Stance person = walk(path, t, mixed({-0.6, 0.35}, {0.0, 3.0}, turned));
@@ -315,11 +320,14 @@ void placing_movers(double t, World& world) {
 void carry_off(double t, double come_s, double take_s, double leave_s, uint32_t look_number, World& world) {
   const Spot2 before_stand = {kStand.x - 0.02, kStand.y - 0.58};
   const auto path = [&](double s) {
-    const std::array<Waypoint, 3> way = {
-        {{come_s, kSouthWing}, {0.5 * (come_s + take_s), {-0.25, -0.66}}, {take_s - 0.3, before_stand}}};
-    const Spot2 walk_about =
-        mixed(along(way, s), stroll(s) + Spot2{0.16, 0.0}, rise(take_s + 0.9, take_s + 3.2, s));
-    return mixed(walk_about, kNorthWing, rise(leave_s, leave_s + 1.8, s));
+    const std::array<Waypoint, 5> way = {{{come_s, kWideSouthWing},
+                                          {0.5 * (come_s + take_s), {-0.25, -0.66}},
+                                          {take_s - 0.3, before_stand},
+                                          {take_s + 0.9, before_stand},
+                                          {take_s + 2.6, {-0.15, -0.55}}}};
+    const Spot2 about = stroll(s - take_s - 1.8) + Spot2{0.20, 0.0};
+    const Spot2 walk_about = mixed(along(way, s), about, rise(take_s + 1.9, take_s + 3.4, s));
+    return mixed(walk_about, Spot2{-0.10, -1.16}, rise(leave_s, leave_s + 1.8, s));
   };
   const double turned = rise(take_s - 1.2, take_s - 0.4, t) * (1.0 - rise(take_s + 1.0, take_s + 2.2, t));
   Stance person = walk(path, t, mixed({-0.7, 0.30}, {0.0, 3.0}, turned));
@@ -336,7 +344,7 @@ void removing_movers(double t, World& world) {
   carry_off(t, 0.8, 3.8, 10.6, 2, world);
 }
 void kidnapping_movers(double t, World& world) {
-  carry_off(t, 2.4, 4.6, 12.4, 5, world);
+  carry_off(t, 2.4, 4.6, 12.0, 5, world);
 }
 
 constexpr Vec3 kCrateHalf = {0.20f, 0.42f, 0.64f};
@@ -344,8 +352,8 @@ constexpr double kCrateDown = 7.6;
 
 void placing_obstructing_movers(double t, World& world) {
   const auto crate = [](double s) {
-    static constexpr std::array<Waypoint, 5> way = {{{0.9, {-0.80, -1.12}},
-                                                     {3.0, {-0.42, -0.85}},
+    static constexpr std::array<Waypoint, 5> way = {{{0.9, {-0.58, -1.16}},
+                                                     {3.0, {-0.40, -0.85}},
                                                      {4.4, {-0.30, -0.35}},
                                                      {6.0, {-0.32, 0.08}},
                                                      {7.2, {-0.32, 0.05}}}};
@@ -357,7 +365,7 @@ void placing_obstructing_movers(double t, World& world) {
   const Vec3 centre = to_float(c.x, c.y, static_cast<double>(kCrateHalf.z) + lifted);
   const float yaw = static_cast<float>(0.15 * (1.0 - rise(1.0, 6.8, t)));
   const auto path = [&](double s) {
-    const Spot2 behind = crate(s) + Spot2{0.44, 0.04};
+    const Spot2 behind = crate(s) + Spot2{0.50, 0.04};
     return mixed(behind, Spot2{0.35 + 0.1 * wave(s, 4.1), 0.72 * wave(s - 8.0, 4.4)}, rise(7.9, 9.4, s));
   };
   Stance person = walk(path, t, mixed({-2.0, 0.0}, {-0.4, 0.0}, rise(7.7, 8.4, t)));
@@ -401,7 +409,7 @@ void person_tracking_movers(double t, World& world) {
 }
 
 const Sway& synchronous_sway() {
-  static const Sway sway = {{-1.35, 0.0, 1.36}, {0.10, 0.44, 0.04}, {8.0, 6.4, 4.9}, 0, 3, 5.7, -6, 2, 4.7};
+  static const Sway sway = {{-1.35, 0.0, 1.36}, {0.10, -0.44, 0.04}, {8.0, 6.4, 4.9}, 0, 3, 5.7, -6, 2, 4.7};
   return sway;
 }
 

@@ -51,10 +51,11 @@ inline Vec3 blend(Vec3 a, Vec3 b, float share_of_b) {
   return a + share_of_b * (b - a);
 }
 
-/// Random dark or bright colour of a cell.
+/// Random colour of a cell, neither black nor glaring.
 inline Vec3 cell_colour(uint32_t h) {
-  return {40.0f + static_cast<float>(h & 0xbfu), 40.0f + static_cast<float>((h >> 8) & 0xbfu),
-          40.0f + static_cast<float>((h >> 16) & 0xbfu)};
+  const auto channel = [&](uint32_t shift) { return static_cast<float>((h >> shift) & 0xffu); };
+  const float grey = 0.4f * channel(4) + 25.0f;
+  return {grey + 0.45f * channel(0), grey + 0.45f * channel(8), grey + 0.45f * channel(16)};
 }
 
 /// A print: coloured tiles of two sizes, soft shading, a light frame line here and there.
