@@ -20,7 +20,7 @@ constexpr std::size_t kNeighbours = 8;
 constexpr double kNeighbourhood_m = 0.03;
 constexpr double kGhost_m = 0.10;
 constexpr float kMargin_m = 0.5f;
-constexpr double kMaxThicknessRatio = 0.1;  ///< of a plane patch: standard deviation across over along it
+constexpr double kMaxThicknessRatio = 0.2;  ///< of a plane patch: standard deviation across over along it
 constexpr double kMinWidthRatio = 0.2;      ///< of a patch: below it the points are a line and span no plane
 
 struct Box {

@@ -75,6 +75,14 @@ void Canvas::text(Point at, const std::string& words, const TextStyle& style) {
   cairo_restore(context);
 }
 
+double Canvas::text_width(const std::string& words, double size_px) {
+  cairo_select_font_face(context_.get(), kFont, CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
+  cairo_set_font_size(context_.get(), size_px);
+  cairo_text_extents_t extents;
+  cairo_text_extents(context_.get(), words.c_str(), &extents);
+  return extents.x_advance;
+}
+
 void Canvas::fill(const Rect& rect, Colour colour) {
   use(colour);
   cairo_rectangle(context_.get(), rect.x, rect.y, rect.width, rect.height);

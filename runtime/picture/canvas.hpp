@@ -50,6 +50,8 @@ class Canvas {
 
   /// `at`: end of the baseline that `align` names.
   void text(Point at, const std::string& words, const TextStyle& style = {});
+  /// Width in pixels of plain words.
+  double text_width(const std::string& words, double size_px);
   void fill(const Rect& rect, Colour colour);
   void outline(const Rect& rect, Colour colour, double width_px = 1);
   /// An area between a closed run of points.

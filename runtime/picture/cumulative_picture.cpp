@@ -9,6 +9,8 @@ namespace stillmap {
 namespace {
 
 constexpr double kHeight_px = 600, kHead_px = 44;
+constexpr Colour kPointColour = {0.55, 0.55, 0.60, 1};
+constexpr Colour kGhostColour = {0.6, 0.2, 0.2, 0.7};
 constexpr uint64_t kMaxVertices = 300'000;  // a curve to the eye needs no more
 
 std::vector<Point> curve(const DistanceSummary& summary) {
@@ -30,28 +32,19 @@ Painted paint_cumulative(const RunInputs& inputs) {
   if (!model) return Error{model.error()};
   Canvas canvas(kPageWidth_px, static_cast<int>(kHeight_px));
   const DistanceSummary& s = model->to_surface;
-  canvas.text(
-      {20, 32},
-      fmt::format(
-          "Mesh against truth: {:.1f} % within 1 cm, {:.1f} % within 2 cm, {:.1f} % within 5 cm; ghosts "
-          "(over 10 cm) {:.2f} %",
-          100 * s.within_1cm, 100 * s.within_2cm, 100 * s.within_5cm, 100 * s.ghosts),
-      {19, Align::left, true});
+  canvas.text({20, 32},
+              fmt::format("Mesh against truth: within 1 cm {:.1f} %, 2 cm {:.1f} %, 5 cm {:.1f} %; ghosts "
+                          "(over 10 cm) {:.2f} %",
+                          100 * s.within_1cm, 100 * s.within_2cm, 100 * s.within_5cm, 100 * s.ghosts),
+              {19, Align::left, true});
   Plot plot(canvas, {0, kHead_px, kPageWidth_px, kHeight_px - kHead_px}, {0, 20}, {0, 102},
             {"", "distance to the true surface [cm]", "share of the mesh [%]"});
-  plot.line({{10, 0}, {10, 102}}, {0.6, 0.2, 0.2, 0.7}, 1.2, true);
-  plot.line(curve(model->to_point), {0.6, 0.6, 0.65, 1}, 1.6, true);
+  plot.line({{10, 0}, {10, 102}}, kGhostColour, 1.2, true);
+  plot.line(curve(model->to_point), kPointColour, 1.6, true);
   plot.line(curve(s), kEstimateColour, 2.5);
-  // At the top the curve itself runs; the legend stands in the middle of the right.
-  const Rect inner = plot.inner();
-  const double x = inner.x + inner.width - 330, y = inner.y + inner.height * 0.55;
-  canvas.fill({x - 12, y - 22, 330, 80}, {1, 1, 1, 0.9});
-  canvas.line({{x, y}, {x + 30, y}}, kEstimateColour, 3);
-  canvas.text({x + 40, y + 5}, "to the surface (local plane of the truth)", {14});
-  canvas.line({{x, y + 22}, {x + 30, y + 22}}, {0.6, 0.6, 0.65, 1}, 2, true);
-  canvas.text({x + 40, y + 27}, "to the nearest point of the truth", {14});
-  canvas.line({{x, y + 44}, {x + 30, y + 44}}, {0.6, 0.2, 0.2, 0.7}, 1.5, true);
-  canvas.text({x + 40, y + 49}, "beyond: ghosts", {14});
+  plot.legend_above({{"to the surface (local plane of the truth)", kEstimateColour},
+                     {"to the nearest point of the truth", kPointColour, Mark::dashed},
+                     {"beyond: ghosts", kGhostColour, Mark::dashed}});
   return canvas;
 }
 

@@ -20,7 +20,7 @@ bool masked(const Picture& mask, int32_t row, int32_t col) {
 
 /// Translucent red where the mask is set, solid along its rim.
 void draw_mask(Picture& picture, const Picture& mask) {
-  const int32_t rim = std::max(1, picture.width / 320);
+  const int32_t rim = std::max(1, picture.width / 213);
   for (int32_t row = 0; row < picture.height; ++row)
     for (int32_t col = 0; col < picture.width; ++col) {
       if (!masked(mask, row, col)) continue;

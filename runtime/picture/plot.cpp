@@ -137,23 +137,35 @@ void Plot::dot(Point value, double radius_px, Colour colour) {
   canvas_.dot(to_page(value), radius_px, colour);
 }
 
+void Plot::draw_mark(const LegendItem& item, Point at) {
+  if (item.mark == Mark::box) canvas_.fill({at.x, at.y - 6, 26, 12}, item.colour);
+  if (item.mark == Mark::dot) canvas_.dot({at.x + 13, at.y}, 5, item.colour);
+  if (item.mark == Mark::line || item.mark == Mark::dashed)
+    canvas_.line({{at.x, at.y}, {at.x + 26, at.y}}, item.colour, 3, item.mark == Mark::dashed);
+  canvas_.text({at.x + 34, at.y + 5}, item.name, {14});
+}
+
 void Plot::legend(const std::vector<LegendItem>& items) {
   constexpr double kLine_px = 22;
-  std::size_t longest = 0;
-  for (const LegendItem& item : items) longest = std::max(longest, item.name.size());
-  const double width = 58 + 8.4 * static_cast<double>(longest);
+  double widest = 0;
+  for (const LegendItem& item : items) widest = std::max(widest, canvas_.text_width(item.name, 14));
+  const double width = 54 + widest;
   const double height = 10 + kLine_px * static_cast<double>(items.size());
   const Rect box = {inner_.x + inner_.width - width - 8, inner_.y + 8, width, height};
   canvas_.fill(box, {1, 1, 1, 0.85});
   canvas_.outline(box, kGrid, 1);
-  double y = box.y + 5 + kLine_px / 2;
+  Point at = {box.x + 10, box.y + 5 + kLine_px / 2};
   for (const LegendItem& item : items) {
-    if (item.box)
-      canvas_.fill({box.x + 10, y - 6, 26, 12}, item.colour);
-    else
-      canvas_.line({{box.x + 10, y}, {box.x + 36, y}}, item.colour, 3);
-    canvas_.text({box.x + 44, y + 5}, item.name, {14});
-    y += kLine_px;
+    draw_mark(item, at);
+    at.y += kLine_px;
+  }
+}
+
+void Plot::legend_above(const std::vector<LegendItem>& items) {
+  Point at = {inner_.x, inner_.y - 16};
+  for (const LegendItem& item : items) {
+    draw_mark(item, at);
+    at.x += 58 + canvas_.text_width(item.name, 14);
   }
 }
 

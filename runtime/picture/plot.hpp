@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <utility>
 #include <vector>
@@ -25,11 +26,13 @@ struct PlotLabels {
   std::string title, x, y;
 };
 
-/// One name of a legend: a short line of that colour (or a box) before it.
+enum class Mark : uint8_t { line, dashed, box, dot };
+
+/// One name of a legend with its mark before it.
 struct LegendItem {
   std::string name;
   Colour colour;
-  bool box = false;
+  Mark mark = Mark::line;
 };
 
 /// Axes with ticks, grid and labels in a part of the page; lines in the units of the axes.
@@ -47,7 +50,10 @@ class Plot {
   /// From bottom to top.
   void shade(Range x, Colour colour);
   void dot(Point value, double radius_px, Colour colour);
+  /// Inside, at the top right.
   void legend(const std::vector<LegendItem>& items);
+  /// In a row above the axes, where the title would stand.
+  void legend_above(const std::vector<LegendItem>& items);
 
   Point to_page(Point value) const;
   const Rect& inner() const { return inner_; }
@@ -55,6 +61,7 @@ class Plot {
  private:
   static Rect inner_of(const Rect& outer);
   std::vector<Point> to_page(const std::vector<Point>& values) const;
+  void draw_mark(const LegendItem& item, Point at);
   void draw_axes(const PlotLabels& labels, const Rect& outer);
 
   Canvas& canvas_;

@@ -71,7 +71,7 @@ Painted paint_timing(const RunInputs& inputs) {
   for (const TimingRow& row : *rows) totals.push_back(row.total_ms);
   std::sort(totals.begin(), totals.end());
   const double p50 = quantile(totals, 0.5), p95 = quantile(totals, 0.95), p99 = quantile(totals, 0.99);
-  const double top_ms = std::max({1.15 * p99, 1.6 * p50, 1e-3});
+  const double top_ms = std::max({1.15 * p99, 1.2 * p50, 1e-3});
   const std::size_t per_bin = (rows->size() + kMaxBins - 1) / kMaxBins;
   Canvas canvas(kPageWidth_px, static_cast<int>(kHeight_px));
   canvas.text({20, 32},
@@ -84,9 +84,9 @@ Painted paint_timing(const RunInputs& inputs) {
             {0, static_cast<double>(rows->size())}, {0, top_ms}, {"", x_label, "time [ms]"});
   draw_stages(plot, binned(*rows, per_bin), static_cast<double>(per_bin));
   plot.line({{0, p50}, {static_cast<double>(rows->size()), p50}}, kAccent, 1.5, true);
-  std::vector<LegendItem> legend = {{"total", kInk}, {"median", kAccent}};
-  for (std::size_t s = kStages; s-- > 0;) legend.push_back({kStageNames[s], kStageColours[s], true});
-  plot.legend(legend);
+  std::vector<LegendItem> legend = {{"total", kInk}, {"median", kAccent, Mark::dashed}};
+  for (std::size_t s = kStages; s-- > 0;) legend.push_back({kStageNames[s], kStageColours[s], Mark::box});
+  plot.legend_above(legend);
   return canvas;
 }
 

@@ -47,7 +47,7 @@ void draw_view(Canvas& canvas, const Rect& outer, std::vector<Point> Path::*view
   std::vector<LegendItem> legend;
   if (!(truth.*view).empty()) legend.push_back({"truth", kTruthColour});
   legend.push_back({"estimate", kEstimateColour});
-  legend.push_back({"start", kAccent});
+  legend.push_back({"start", kAccent, Mark::dot});
   plot.legend(legend);
 }
 

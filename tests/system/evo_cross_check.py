@@ -98,7 +98,7 @@ def check(program, seed, start_s):
         generate(folder, seed, start_s)
         truth = file_interface.read_tum_trajectory_file(f"{folder}/truth.txt")
         estimate = file_interface.read_tum_trajectory_file(f"{folder}/estimate.txt")
-        truth, estimate = sync.associate_trajectories(truth, estimate, 0.02)
+        truth, estimate = sync.associate_trajectories(truth, estimate, max_diff=0.02)
         rpe = ours(program, "rpe", folder, "--delta-s", "1.0")
         good = compare(f"seed {seed} rpe translation", statistics(
             evo_rpe(truth, estimate, metrics.PoseRelation.translation_part)), rpe, "trans_eq2_", "m")
