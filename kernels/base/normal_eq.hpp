@@ -6,37 +6,27 @@
 
 namespace stillmap {
 
-/// Sums of one registration pass: J^T W J (upper triangle), J^T W r, the cost and what went into it.
-/// T is float within a tile of pixels and double over the image; tiles are added in a fixed order.
+/// Places of the sums of one registration pass.
+enum NormalEqTerm : int32_t {
+  kHessian = 0,      ///< J^T W J, upper triangle row by row, 21 of them
+  kGradient = 21,    ///< J^T W r, 6 of them
+  kCost = 27,        ///< of the points used, robust where asked
+  kSumSdf2 = 28,     ///< of the inliers' squared distances, m^2
+  kPoints = 29,      ///< points with a value in the map
+  kInliers = 30,     ///< of those, within track.inlier_m of the surface
+  kConsidered = 31,  ///< points measured, unmasked, in range
+  kTerms = 32
+};
+
+/// Sums of one registration pass. T is float within a tile of pixels and double over the image; tiles are
+/// added in a fixed order, so the result does not depend on the number of threads.
 template <class T>
 struct NormalEqT {
-  static constexpr int kHessian = 21;
-  T hessian[kHessian] = {};
-  T gradient[6] = {};
-  T cost = 0;        ///< of the points used, robust where asked
-  T sum_sdf2 = 0;    ///< of the inliers' squared distances, m^2
-  T points = 0;      ///< with a value in the map
-  T inliers = 0;     ///< of those, within track.inlier_m of the surface
-  T considered = 0;  ///< valid, unmasked, in range
+  T sum[kTerms] = {};
 
-  /// Adds one residual with Jacobian `j` and weight `w`.
-  STILLMAP_HD void add(const float j[6], float residual, float w) {
-    int k = 0;
-    for (int r = 0; r < 6; ++r) {
-      const float wj = w * j[r];
-      for (int c = r; c < 6; ++c) hessian[k++] += wj * j[c];
-      gradient[r] += wj * residual;
-    }
-  }
   template <class U>
   STILLMAP_HD void add(const NormalEqT<U>& other) {
-    for (int i = 0; i < kHessian; ++i) hessian[i] += static_cast<T>(other.hessian[i]);
-    for (int i = 0; i < 6; ++i) gradient[i] += static_cast<T>(other.gradient[i]);
-    cost += static_cast<T>(other.cost);
-    sum_sdf2 += static_cast<T>(other.sum_sdf2);
-    points += static_cast<T>(other.points);
-    inliers += static_cast<T>(other.inliers);
-    considered += static_cast<T>(other.considered);
+    for (int32_t i = 0; i < kTerms; ++i) sum[i] += static_cast<T>(other.sum[i]);
   }
 };
 using NormalEq = NormalEqT<double>;

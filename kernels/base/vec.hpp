@@ -1,6 +1,7 @@
 #pragma once
 
-// Not <cmath>: this one brings the float overloads of sqrt, sin and so on that unqualified calls need on both engines.
+// Not <cmath>: this one brings the float overloads of sqrt, sin and so on that unqualified calls need on both
+// engines.
 #include <math.h>  // NOLINT(modernize-deprecated-headers)
 
 #include "kernels/base/hd.hpp"

@@ -19,27 +19,27 @@ struct VisibleBlock {
 struct IntegratePass {
   VolumeView map;
   FrameGeometry geometry;
-  ImageView<const Rgb8> colour;
+  const LumaChroma* colour;  ///< same pixels as geometry.static_depth_m
   Se3 T_cam_map;
-  int32_t weight_cap;
-  bool free_space;
-  uint32_t frame;  ///< counts frames, for the dither
+  FuseWeights weights;
+  bool free_space;  ///< false: a voxel that was never in the band stays unobserved
+  uint32_t frame;   ///< counts frames, for the dither
 
   STILLMAP_HD void operator()(VisibleBlock visible) const {
-    if (visible.all_free())
-      fuse_free_block(visible.id());
-    else
+    if (!visible.all_free())
       fuse_mixed_block(visible.id());
+    else if (!map.settled_free[visible.id()])
+      fuse_free_block(visible.id());
   }
 
  private:
   STILLMAP_HD void fuse_free_block(BlockId id) const {
-    if (map.settled_free[id]) return;
     VoxelBlock& block = map.blocks[id];
     bool settled = true;
     for (int32_t i = 0; i < kBlockVoxels; ++i) {
-      fuse_free(block.surface[i], block.record[i], weight_cap);
-      settled &= block.surface[i].sdf == kSdfMax && block.record[i].weight == weight_cap;
+      const Seen seen = free_space || block.record[i].weight > 0 ? Seen::free : Seen::nothing;
+      fuse_voxel(block.surface[i], block.record[i], seen, 0.0f, {}, weights, 0.0f);
+      settled &= (block.surface[i].sdf == kSdfMax) & (block.record[i].weight >= weights.weight_cap);
     }
     map.settled_free[id] = settled;
   }
@@ -52,27 +52,38 @@ struct IntegratePass {
     const Vec3 dx = map.voxel_m * Vec3{r(0, 0), r(1, 0), r(2, 0)},
                dy = map.voxel_m * Vec3{r(0, 1), r(1, 1), r(2, 1)},
                dz = map.voxel_m * Vec3{r(0, 2), r(1, 2), r(2, 2)};
-    const float units_per_m = static_cast<float>(kSdfMax) / map.truncation_m;
-    bool touched_band = false;
+    int32_t touched_band = 0;
     for (int32_t z = 0; z < kBlockEdge; ++z)
       for (int32_t y = 0; y < kBlockEdge; ++y) {
         const Vec3 row_cam = origin_cam + static_cast<float>(y) * dy + static_cast<float>(z) * dz;
-        for (int32_t x = 0; x < kBlockEdge; ++x) {
-          const Observation o = observe(geometry, row_cam + static_cast<float>(x) * dx);
-          const int32_t i = voxel_index(x, y, z);
-          if (o.seen == Seen::nothing) continue;
-          if (o.seen == Seen::free) {
-            if (free_space || block.record[i].weight > 0)
-              fuse_free(block.surface[i], block.record[i], weight_cap);
-            continue;
-          }
-          touched_band = true;
-          fuse_distance(block.surface[i], block.record[i], o.sdf_m * units_per_m, weight_cap);
-          fuse_colour(block.surface[i], block.record[i], colour.at(o.row, o.col), weight_cap,
-                      dither(static_cast<uint32_t>(i) + id * kBlockVoxels, frame));
-        }
+        touched_band |= fuse_row(block, voxel_index(0, y, z), row_cam, dx, id);
       }
     if (touched_band) map.settled_free[id] = 0;
+  }
+
+  /// Eight voxels along x: first what the frame says of them, then, unless it says nothing, the update.
+  STILLMAP_HD int32_t fuse_row(VoxelBlock& block, int32_t first, Vec3 row_cam, Vec3 dx, BlockId id) const {
+    Seen seen[kBlockEdge];
+    float sdf_m[kBlockEdge];
+    int32_t pixel[kBlockEdge];
+    int32_t any = 0, band = 0;
+    for (int32_t x = 0; x < kBlockEdge; ++x) {
+      const Observation o = observe(geometry, row_cam + static_cast<float>(x) * dx);
+      const bool keep = (o.seen == Seen::band) |
+                        ((o.seen == Seen::free) & (free_space | (block.record[first + x].weight > 0)));
+      seen[x] = keep ? o.seen : Seen::nothing;
+      sdf_m[x] = o.sdf_m;
+      pixel[x] = o.pixel;
+      any |= static_cast<int32_t>(seen[x]);
+      band |= static_cast<int32_t>(o.seen == Seen::band);
+    }
+    if (any == 0) return 0;
+    for (int32_t x = 0; x < kBlockEdge; ++x) {
+      const int32_t i = first + x;
+      fuse_voxel(block.surface[i], block.record[i], seen[x], sdf_m[x], colour[pixel[x]], weights,
+                 dither(static_cast<uint32_t>(i) + id * kBlockVoxels, frame));
+    }
+    return band;
   }
 };
 

@@ -36,20 +36,15 @@ STILLMAP_HD const VoxelBlock* lookup(const VolumeView& map, BlockKey key, BlockC
   return cache.block;
 }
 
-/// The eight voxels about a point, x fastest: 000 100 010 110 001 101 011 111, and where the point lies
-/// between them.
-struct Corners {
-  VoxelSurface voxel[8];
-  Vec3 fraction;  ///< 0..1 along each axis
-};
-
-/// Reads the voxels around `p_map`.                                       test: volume_test
-/// @return false when one of them was never observed; `out` is then of no meaning
-STILLMAP_HD bool read_corners(const VolumeView& map, Vec3 p_map, BlockCache& cache, Corners& out) {
-  const float inv = 1.0f / map.voxel_m;
-  const float gx = p_map.x * inv, gy = p_map.y * inv, gz = p_map.z * inv;
-  const float fx = floorf(gx), fy = floorf(gy), fz = floorf(gz);
-  out.fraction = {gx - fx, gy - fy, gz - fz};
+/// Reads the eight voxels around a point, x fastest: 000 100 010 110 001 101 011 111.            test:
+/// volume_test
+/// @param grid position in voxels (p_map / voxel_m)
+/// @param fraction where the point lies between them, 0..1 along each axis
+/// @return false when one of them was never observed; the outputs are then of no meaning
+STILLMAP_HD bool read_corners(const VolumeView& map, Vec3 grid, BlockCache& cache, VoxelSurface voxel[8],
+                              Vec3& fraction) {
+  const float fx = floorf(grid.x), fy = floorf(grid.y), fz = floorf(grid.z);
+  fraction = {grid.x - fx, grid.y - fy, grid.z - fz};
   const Int3 base = {static_cast<int32_t>(fx), static_cast<int32_t>(fy), static_cast<int32_t>(fz)};
   const Int3 local = {base.x & 7, base.y & 7, base.z & 7};
   if (local.x < 7 && local.y < 7 && local.z < 7) {
@@ -57,18 +52,18 @@ STILLMAP_HD bool read_corners(const VolumeView& map, Vec3 p_map, BlockCache& cac
     if (!block) return false;
     const VoxelSurface* v = block->surface + voxel_index(local.x, local.y, local.z);
     constexpr int32_t y = kBlockEdge, z = kBlockEdge * kBlockEdge;
-    out.voxel[0] = v[0], out.voxel[1] = v[1], out.voxel[2] = v[y], out.voxel[3] = v[y + 1];
-    out.voxel[4] = v[z], out.voxel[5] = v[z + 1], out.voxel[6] = v[z + y], out.voxel[7] = v[z + y + 1];
+    voxel[0] = v[0], voxel[1] = v[1], voxel[2] = v[y], voxel[3] = v[y + 1];
+    voxel[4] = v[z], voxel[5] = v[z + 1], voxel[6] = v[z + y], voxel[7] = v[z + y + 1];
   } else {
     for (int32_t i = 0; i < 8; ++i) {
-      const Int3 voxel = {base.x + (i & 1), base.y + (i >> 1 & 1), base.z + (i >> 2)};
-      const VoxelBlock* block = lookup(map, pack(block_of_voxel(voxel)), cache);
+      const Int3 corner = {base.x + (i & 1), base.y + (i >> 1 & 1), base.z + (i >> 2)};
+      const VoxelBlock* block = lookup(map, pack(block_of_voxel(corner)), cache);
       if (!block) return false;
-      out.voxel[i] = block->surface[index_in_block(voxel)];
+      voxel[i] = block->surface[index_in_block(corner)];
     }
   }
   bool observed = true;
-  for (const VoxelSurface& v : out.voxel) observed &= v.sdf != kSdfUnobserved;
+  for (int32_t i = 0; i < 8; ++i) observed &= voxel[i].sdf != kSdfUnobserved;
   return observed;
 }
 
@@ -94,11 +89,12 @@ STILLMAP_HD Vec3 trilinear_gradient(const float c[8], Vec3 f) {
 /// V_SDF at a point, metres (paper section III-B).                        test: volume_test
 /// @return false when a neighbouring voxel is unobserved
 STILLMAP_HD bool sample_sdf(const VolumeView& map, Vec3 p_map, BlockCache& cache, float& sdf_m) {
-  Corners corners;
-  if (!read_corners(map, p_map, cache, corners)) return false;
+  VoxelSurface voxel[8];
+  Vec3 fraction;
+  if (!read_corners(map, (1.0f / map.voxel_m) * p_map, cache, voxel, fraction)) return false;
   float sdf[8];
-  for (int32_t i = 0; i < 8; ++i) sdf[i] = static_cast<float>(corners.voxel[i].sdf);
-  sdf_m = trilinear(sdf, corners.fraction) * map.sdf_unit_m();
+  for (int32_t i = 0; i < 8; ++i) sdf[i] = static_cast<float>(voxel[i].sdf);
+  sdf_m = trilinear(sdf, fraction) * map.sdf_unit_m();
   return true;
 }
 

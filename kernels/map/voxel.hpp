@@ -50,8 +50,22 @@ STILLMAP_HD float luminance(Rgb8 c) {
   return luminance(static_cast<float>(c.r), static_cast<float>(c.g), static_cast<float>(c.b));
 }
 
+/// Colour of a prepared pixel, in the units of the voxels.
+struct LumaChroma {
+  uint16_t luma = 0;  ///< kLumaScale is white
+  uint8_t cb = 128, cr = 128;
+};
+static_assert(sizeof(LumaChroma) == 4, "one 32-bit load");
+
 STILLMAP_HD uint8_t clamp_to_byte(float x) {
   return static_cast<uint8_t>(x < 0.0f ? 0.0f : x > 255.0f ? 255.0f : x + 0.5f);
+}
+
+STILLMAP_HD LumaChroma luma_chroma(Rgb8 c) {
+  const float y = luminance(c);
+  return {static_cast<uint16_t>(y * kLumaScale + 0.5f),
+          clamp_to_byte(128.0f + (static_cast<float>(c.b) - 255.0f * y) * (1.0f / 1.8556f)),
+          clamp_to_byte(128.0f + (static_cast<float>(c.r) - 255.0f * y) * (1.0f / 1.5748f))};
 }
 
 /// Colour of a voxel from luminance (0..1) and chroma (bytes about 128).

@@ -43,7 +43,7 @@ struct PreparePass {
   ImageView<const uint16_t> depth_raw;
   ImageView<const Rgb8> colour_raw;
   ImageView<float> depth_m;
-  ImageView<float> luma;  ///< 0..1
+  ImageView<LumaChroma> luma_chroma_image;
   ImageView<Rgb8> colour;
   ImageView<const Pixel>
       source_pixel;  ///< where an undistorted pixel lies in the raw image; no data: same place
@@ -68,7 +68,7 @@ struct PreparePass {
     const float z_m = metres_from_raw(raw, m_per_unit, min_m);
     depth_m.at(row, col) = z_m;
     colour.at(row, col) = rgb;
-    luma.at(row, col) = luminance(rgb);
+    luma_chroma_image.at(row, col) = luma_chroma(rgb);
     return z_m > 0.0f && z_m <= max_m;
   }
 };

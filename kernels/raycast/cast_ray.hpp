@@ -55,6 +55,12 @@ STILLMAP_HD bool in_grid(Vec3 g) {
   return fabsf(g.x) < limit && fabsf(g.y) < limit && fabsf(g.z) < limit;
 }
 
+/// floorf for what is in_grid; a call of the library on machines of the baseline.
+STILLMAP_HD int32_t round_down(float x) {
+  const int32_t cut = static_cast<int32_t>(x);
+  return cut - static_cast<int32_t>(x < static_cast<float>(cut));
+}
+
 /// A voxel with the block that holds it; null when that block is absent.
 struct VoxelAt {
   const VoxelBlock* block;
@@ -70,9 +76,9 @@ struct CornersAt {
 template <class Blocks>
 STILLMAP_HD CornersAt corners_at(const VolumeView& map, Vec3 g, Blocks& blocks) {
   CornersAt out;
-  const float fx = floorf(g.x), fy = floorf(g.y), fz = floorf(g.z);
-  out.fraction = {g.x - fx, g.y - fy, g.z - fz};
-  const Int3 base = {static_cast<int32_t>(fx), static_cast<int32_t>(fy), static_cast<int32_t>(fz)};
+  const Int3 base = {round_down(g.x), round_down(g.y), round_down(g.z)};
+  out.fraction = {g.x - static_cast<float>(base.x), g.y - static_cast<float>(base.y),
+                  g.z - static_cast<float>(base.z)};
   const Int3 local = {base.x & 7, base.y & 7, base.z & 7};
   const VoxelBlock* block = lookup(map, pack(block_of_voxel(base)), blocks);
   for (int32_t i = 0; i < 8; ++i) {
@@ -200,8 +206,7 @@ STILLMAP_HD RayHit cast_ray(const VolumeView& map, const Ray& ray, Blocks& block
     const Vec3 g = o + t * d;
     if (!in_grid(g)) return {};
     const Vec3 h = {g.x + 0.5f, g.y + 0.5f, g.z + 0.5f};
-    const Int3 voxel = {static_cast<int32_t>(floorf(h.x)), static_cast<int32_t>(floorf(h.y)),
-                        static_cast<int32_t>(floorf(h.z))};
+    const Int3 voxel = {round_down(h.x), round_down(h.y), round_down(h.z)};
     const VoxelBlock* block = lookup(map, pack(block_of_voxel(voxel)), blocks);
     if (!block) {
       t += fmaxf(exit_m(h, d, block_of_voxel(voxel)), 0.0f) + 0.01f * m_per_voxel;

@@ -3,6 +3,7 @@
 #include "kernels/base/pinhole.hpp"
 #include "kernels/base/se3.hpp"
 #include "kernels/raycast/cast_ray.hpp"
+#include "kernels/raycast/ray_ranges.hpp"
 
 namespace stillmap {
 
@@ -16,15 +17,24 @@ struct RaycastPass {
   float near_m = 0.05f;
   float far_m = 10.0f;
   bool through_backs = false;  ///< true: walls seen from behind are transparent (views from outside a room)
+  RayRanges ranges = {};       ///< optional; see ray_ranges.hpp
 
   template <class Blocks>
   STILLMAP_HD void operator()(int32_t row, int32_t col, Blocks& blocks) const {
     const Vec3 direction =
         T_map_cam.rotation * unproject(k, static_cast<float>(col), static_cast<float>(row), 1.0f);
-    const RayHit hit =
-        cast_ray(map, {T_map_cam.translation, direction, near_m, far_m, through_backs}, blocks);
+    Ray ray{T_map_cam.translation, direction, near_m, far_m, through_backs};
+    if (ranges.tiles.data) narrow(ray, ranges.of_pixel(row, col));
+    const RayHit hit = cast_ray(map, ray, blocks);
     depth_m.at(row, col) = hit.depth_m;
     colour.at(row, col) = hit.colour;
+  }
+
+ private:
+  /// Begins early enough to be outside before a surface.
+  STILLMAP_HD void narrow(Ray& ray, RayRange range) const {
+    ray.near_m = fmaxf(ray.near_m, float_of(range.nearest_bits) - map.truncation_m);
+    ray.far_m = fminf(ray.far_m, float_of(range.farthest_bits) + map.voxel_m);
   }
 };
 

@@ -13,9 +13,9 @@ struct Step {
 /// Gauss-Newton step with damping; false when the system is singular.
 bool solve_step(const NormalEq& sums, double damping, const Se3& T_map_cam, Step& step) {
   Cholesky6 cholesky;
-  if (!cholesky.factor(sums.hessian, damping)) return false;
+  if (!cholesky.factor(sums.sum + kHessian, damping)) return false;
   double x[6];
-  cholesky.solve(sums.gradient, x);
+  cholesky.solve(sums.sum + kGradient, x);
   const Vec3d v = {-x[0], -x[1], -x[2]}, w = {-x[3], -x[4], -x[5]};
   step.translation_m = norm(v);
   step.rotation_rad = norm(w);
@@ -27,12 +27,12 @@ bool solve_step(const NormalEq& sums, double damping, const Se3& T_map_cam, Step
 }
 
 double mean_cost(const NormalEq& sums) {
-  return sums.points > 0 ? sums.cost / sums.points : HUGE_VAL;
+  return sums.sum[kPoints] > 0 ? sums.sum[kCost] / sums.sum[kPoints] : HUGE_VAL;
 }
 
 /// A step must lower the mean cost and may not do so by leaving the mapped space.
 bool better(const NormalEq& candidate, const NormalEq& current) {
-  return candidate.points >= 0.8 * current.points && mean_cost(candidate) < mean_cost(current);
+  return candidate.sum[kPoints] >= 0.8 * current.sum[kPoints] && mean_cost(candidate) < mean_cost(current);
 }
 
 struct State {
@@ -67,8 +67,8 @@ int32_t run_level(const PassRunner& pass, int32_t step_px, int32_t iterations, c
 /// Inverse Hessian times the residual variance, moved from the camera centre to the map's origin.
 void write_covariance(const NormalEq& sums, Vec3 centre, float covariance[21]) {
   Cholesky6 cholesky;
-  if (!cholesky.factor(sums.hessian, 0.0) || sums.inliers < 1) return;
-  const double variance = sums.sum_sdf2 / sums.inliers;
+  if (!cholesky.factor(sums.sum + kHessian, 0.0) || sums.sum[kInliers] < 1) return;
+  const double variance = sums.sum[kSumSdf2] / sums.sum[kInliers];
   double about_centre[6][6];
   for (int c = 0; c < 6; ++c) {
     double unit[6] = {}, column[6];
@@ -103,11 +103,14 @@ TrackResult register_frame(const PassRunner& pass, const Se3& T_start, const Tra
     result.iterations += run_level(pass, 1 << level, iterations[level], params, state);
 
   const NormalEq& sums = state.sums;
-  result.mapped_ratio = static_cast<float>(sums.considered > 0 ? sums.points / sums.considered : 0);
-  result.inlier_ratio = static_cast<float>(sums.points > 0 ? sums.inliers / sums.points : 0);
-  result.rmse_m = static_cast<float>(sums.inliers > 0 ? std::sqrt(sums.sum_sdf2 / sums.inliers) : 0);
+  result.mapped_ratio =
+      static_cast<float>(sums.sum[kConsidered] > 0 ? sums.sum[kPoints] / sums.sum[kConsidered] : 0);
+  result.inlier_ratio =
+      static_cast<float>(sums.sum[kPoints] > 0 ? sums.sum[kInliers] / sums.sum[kPoints] : 0);
+  result.rmse_m =
+      static_cast<float>(sums.sum[kInliers] > 0 ? std::sqrt(sums.sum[kSumSdf2] / sums.sum[kInliers]) : 0);
   Cholesky6 cholesky;
-  if (sums.points < min_points || !cholesky.factor(sums.hessian, 0.0)) {
+  if (sums.sum[kPoints] < min_points || !cholesky.factor(sums.sum + kHessian, 0.0)) {
     result.status = Status::degenerate;
     return result;
   }

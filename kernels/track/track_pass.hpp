@@ -2,68 +2,62 @@
 
 #include <cstdint>
 
-#include "kernels/base/normal_eq.hpp"
 #include "kernels/base/pinhole.hpp"
 #include "kernels/base/se3.hpp"
-#include "kernels/params.hpp"
 #include "kernels/track/sdf_residual.hpp"
 
 namespace stillmap {
 
-/// One pixel of E_d + w_c E_c (paper Eq. (4)) added to normal equations.
+/// A row pixel on its way into the map.
+struct PixelPoint {
+  Vec3 arm;             ///< camera centre to point, metres, map axes
+  Vec3 grid;            ///< position in voxels, map frame
+  bool usable = false;  ///< measured, in range, not masked
+};
+
+/// One pass of E_d + w_c E_c (paper Eq. (4)) over an image.
 ///
 /// The increment turns about the camera centre: p' = c + v + exp(w) (p - c). Far from the map's origin this
 /// keeps translation and rotation apart, which single precision needs.
 struct TrackPass {
   VolumeView map;
   ImageView<const float> depth_m;
-  ImageView<const float> luma;
-  ImageView<const uint8_t> mask;  ///< no data: nothing is masked
+  ImageView<const LumaChroma> colour;
+  ImageView<const uint8_t> mask;  ///< 0: static
+  bool use_mask = false;          ///< false: the first registration, all pixels
   Intrinsics k;
   Se3 T_map_cam;
   float max_m = 0;
-  float colour_weight = 0;
-  float huber_m = 0;  ///< 0: squared error
-  float inlier_m = 0;
+  TrackWeights weights;
 
-  STILLMAP_HD void operator()(int32_t row, int32_t col, BlockCache& cache, NormalEqT<float>& sums) const {
+  STILLMAP_HD PixelPoint point_of(int32_t row, int32_t col) const {
+    PixelPoint p;
     const float z_m = depth_m.at(row, col);
-    if (!(z_m > 0.0f && z_m <= max_m)) return;
-    if (mask.data && mask.at(row, col)) return;
-    sums.considered += 1.0f;
-    const Vec3 p_cam = unproject(k, static_cast<float>(col), static_cast<float>(row), z_m);
-    const Vec3 arm = T_map_cam.rotation * p_cam;  // camera centre to point, map axes
-    PointSample sample;
-    if (!sample_point(map, arm + T_map_cam.translation, cache, sample)) return;
-    sums.points += 1.0f;
-    add_depth(sample, arm, sums);
-    if (sample.has_surface && colour_weight > 0.0f) add_colour(sample, arm, luma.at(row, col), sums);
+    const bool masked = use_mask & (mask.at(row, col) != 0);
+    p.usable = (z_m > 0.0f) & (z_m <= max_m) & !masked;
+    p.arm = T_map_cam.rotation * unproject(k, static_cast<float>(col), static_cast<float>(row), z_m);
+    p.grid = weights.inv_voxel_m * (p.arm + T_map_cam.translation);
+    return p;
   }
 
- private:
-  STILLMAP_HD void add_depth(const PointSample& s, Vec3 arm, NormalEqT<float>& sums) const {
-    const float r = s.sdf_m, size = fabsf(r);
-    if (size <= inlier_m) {
-      sums.inliers += 1.0f;
-      sums.sum_sdf2 += r * r;
-    }
-    const bool linear = huber_m > 0.0f && size > huber_m;
-    sums.cost += linear ? huber_m * (2.0f * size - huber_m) : r * r;
-    if (!s.has_surface) return;  // in free space: no direction to move in
-    const float j[6] = {s.sdf_gradient.x,
-                        s.sdf_gradient.y,
-                        s.sdf_gradient.z,
-                        cross(arm, s.sdf_gradient).x,
-                        cross(arm, s.sdf_gradient).y,
-                        cross(arm, s.sdf_gradient).z};
-    sums.add(j, r, linear ? huber_m / size : 1.0f);
+  /// Fetches the voxels around a usable point.
+  /// @return false when one was never observed
+  STILLMAP_HD bool fetch(const PixelPoint& p, int32_t row, int32_t col, BlockCache& cache,
+                         TrackPoint& out) const {
+    if (!read_corners(map, p.grid, cache, out.voxel, out.fraction)) return false;
+    out.arm = p.arm;
+    out.luma = static_cast<float>(colour.at(row, col).luma) * (1.0f / kLumaScale);
+    return true;
   }
-  STILLMAP_HD void add_colour(const PointSample& s, Vec3 arm, float measured, NormalEqT<float>& sums) const {
-    const float r = s.luma - measured;
-    const Vec3 turn = cross(arm, s.luma_gradient);
-    const float j[6] = {s.luma_gradient.x, s.luma_gradient.y, s.luma_gradient.z, turn.x, turn.y, turn.z};
-    sums.cost += colour_weight * r * r;
-    sums.add(j, r, colour_weight);
+
+  /// All of it for one pixel; the plain form that the vector loops of the CPU are checked against.
+  STILLMAP_HD void operator()(int32_t row, int32_t col, BlockCache& cache, NormalEqT<float>& sums) const {
+    const PixelPoint p = point_of(row, col);
+    if (!p.usable) return;
+    sums.sum[kConsidered] += 1.0f;
+    TrackPoint point;
+    if (fetch(p, row, col, cache, point))
+      add_point(point_terms(point, weights), point.arm, 1.0f, sums.sum, 1);
   }
 };
 

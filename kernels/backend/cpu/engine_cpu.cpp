@@ -5,8 +5,10 @@
 #include <new>
 
 #include "kernels/backend/cpu/arena.hpp"
+#include "kernels/backend/cpu/extract.hpp"
 #include "kernels/backend/cpu/loops.hpp"
 #include "kernels/backend/cpu/map_storage.hpp"
+#include "kernels/backend/cpu/raycast.hpp"
 #include "kernels/backend/cpu/thread_pool.hpp"
 #include "kernels/engine.hpp"
 #include "kernels/mask/grow_mask.hpp"
@@ -55,7 +57,8 @@ uint64_t max_groups(const EngineParams& p) {
 
 /// Everything that lives as long as the engine.
 struct CpuMemory {
-  ImageView<float> depth_m, luma, static_depth_m;
+  ImageView<float> depth_m, static_depth_m;
+  ImageView<LumaChroma> luma_chroma;
   ImageView<Rgb8> colour;
   ImageView<Pixel> source_pixel;  ///< only with distortion
   ImageView<uint8_t> mask, mask_scratch;
@@ -65,12 +68,13 @@ struct CpuMemory {
   View<int32_t> valid_tiles;
   View<GroupView> groups;
   View<VisibleBlock> visible;
+  View<uint8_t> extract_scratch, raycast_scratch;
   MapStorage map;
 
   void carve(Arena& arena, const EngineParams& p) {
     const int32_t rows = p.camera.k.height, cols = p.camera.k.width;
     depth_m = arena.take_image<float>("images", rows, cols);
-    luma = arena.take_image<float>("images", rows, cols);
+    luma_chroma = arena.take_image<LumaChroma>("images", rows, cols);
     static_depth_m = arena.take_image<float>("images", rows, cols);
     colour = arena.take_image<Rgb8>("images", rows, cols);
     mask = arena.take_image<uint8_t>("mask", rows, cols);
@@ -83,6 +87,9 @@ struct CpuMemory {
     valid_tiles = arena.take<int32_t>("sums of tiles", tiles);
     groups = arena.take<GroupView>("visible blocks", max_groups(p));
     visible = arena.take<VisibleBlock>("visible blocks", static_cast<uint64_t>(p.map.pool_blocks));
+    extract_scratch =
+        arena.take<uint8_t>("mesh and views", extract_scratch_bytes(static_cast<uint32_t>(p.map.pool_blocks)));
+    raycast_scratch = arena.take<uint8_t>("mesh and views", raycast_scratch_bytes());
     map.carve(arena, p.map);
   }
 
@@ -121,10 +128,13 @@ class CpuEngine final : public Engine {
     return register_to_map(T_world_cam_start, true);
   }
   IntegrateResult integrate(const Se3& T_world_cam) override;
-  Status raycast(const Se3&, const Intrinsics&, ImageView<float>, ImageView<Rgb8>) override {
-    return Status::unavailable;
+  Status raycast(const Se3& T_world_cam, const Intrinsics& k, ImageView<float> depth_m,
+                 ImageView<Rgb8> colour) override {
+    return stillmap::raycast({memory_.map.view(), k, T_world_cam, depth_m, colour}, memory_.raycast_scratch, pool_);
   }
-  Status extract_mesh(MeshSink&) override { return Status::unavailable; }
+  Status extract_mesh(MeshSink& sink) override {
+    return stillmap::extract_mesh(memory_.map.view(), sink, memory_.extract_scratch, pool_);
+  }
 
   ImageView<const uint8_t> mask_image() const override { return memory_.mask; }
   ImageView<const float> depth_image_m() const override { return memory_.depth_m; }
@@ -135,6 +145,7 @@ class CpuEngine final : public Engine {
  private:
   const Intrinsics& k() const { return params_.camera.k; }
   void fill_source_pixels();
+  TrackPass track_pass(const Se3& T_map_cam) const;
   TrackResult register_to_map(const Se3& T_start, bool masked);
   void set_nothing_masked();
   void update_static_depth();
@@ -164,7 +175,7 @@ PrepareResult CpuEngine::prepare(const FrameView& frame) {
   const PreparePass pass{frame.depth_raw,
                          frame.colour,
                          memory_.depth_m,
-                         memory_.luma,
+                         memory_.luma_chroma,
                          memory_.colour,
                          memory_.source_pixel,
                          1.0f / params_.depth_units_per_m,
@@ -187,22 +198,28 @@ void CpuEngine::set_nothing_masked() {
   std::fill_n(memory_.mask.data, memory_.mask.pixels(), uint8_t{0});
 }
 
+TrackPass CpuEngine::track_pass(const Se3& T_map_cam) const {
+  TrackPass pass;
+  pass.map = memory_.map.view();
+  pass.depth_m = memory_.depth_m;
+  pass.colour = memory_.luma_chroma;
+  pass.mask = memory_.mask;
+  pass.k = k();
+  pass.T_map_cam = T_map_cam;
+  pass.max_m = params_.depth.max_m;
+  const TrackParams& p = params_.track;
+  constexpr float kNoHuber_m = 1e9f;
+  pass.weights = {pass.map.sdf_unit_m(), 1.0f / params_.map.voxel_m, p.colour_weight,
+                  p.huber_depth_m > 0 ? p.huber_depth_m : kNoHuber_m, p.inlier_m};
+  return pass;
+}
+
 TrackResult CpuEngine::register_to_map(const Se3& T_start, bool masked) {
   struct Context {
     CpuEngine* engine;
     TrackPass pass;
-  } context{this,
-            {memory_.map.view(),
-             memory_.depth_m,
-             memory_.luma,
-             {},
-             k(),
-             T_start,
-             params_.depth.max_m,
-             params_.track.colour_weight,
-             params_.track.huber_depth_m,
-             params_.track.inlier_m}};
-  if (masked) context.pass.mask = memory_.mask;
+  } context{this, track_pass(T_start)};
+  context.pass.use_mask = masked;
   const PassRunner runner{[](void* opaque, const Se3& T_map_cam, int32_t step) {
                             auto& [engine, pass] = *static_cast<Context*>(opaque);
                             pass.T_map_cam = T_map_cam;
@@ -349,8 +366,13 @@ IntegrateResult CpuEngine::integrate(const Se3& T_world_cam) {
   const Status listed = list_visible(visible, result.visible_blocks);
   if (listed != Status::ok) result.status = listed;
   const IntegratePass pass{
-      memory_.map.view(),           geometry, memory_.colour, visible.T_cam_map, params_.integrate.weight_cap,
-      params_.integrate.free_space, frames_++};
+      memory_.map.view(),
+      geometry,
+      memory_.luma_chroma.data,
+      visible.T_cam_map,
+      {static_cast<float>(kSdfMax) / params_.map.truncation_m, params_.integrate.weight_cap},
+      params_.integrate.free_space,
+      frames_++};
   const View<const VisibleBlock> blocks{memory_.visible.data, result.visible_blocks};
   pool_.for_each((blocks.size + kBlocksPerTile - 1) / kBlocksPerTile, [&](uint32_t tile) {
     const uint32_t first = tile * kBlocksPerTile;
