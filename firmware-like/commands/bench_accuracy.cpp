@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/registry.hpp"
+#include "drivers/synthetic/synthetic_source.hpp"
 #include "firmware-like/commands/bench_options.hpp"
 #include "firmware-like/commands/command.hpp"
 #include "firmware-like/commands/run.hpp"
@@ -122,7 +122,7 @@ int bench_accuracy(const BenchOptions& o) {
   catch_stop_signals();
   std::vector<std::string> sources = o.sources;
   if (sources.empty())
-    for (const std::string& scene : synthetic_scenes()) sources.push_back("synthetic:" + scene);
+    for (const std::string& scene : synthetic_scene_names()) sources.push_back("synthetic:" + scene);
   const std::vector<std::string> configs = o.configs.empty() ? std::vector<std::string>{""} : o.configs;
   Json rows = Json::array();
   bool all_good = true;

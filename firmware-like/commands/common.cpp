@@ -44,6 +44,18 @@ Result<Done> check(const Config& config) {
   return Error{"the configuration cannot be used:" + text, ErrorKind::bad_usage};
 }
 
+SourceOptions source_options(const Config& config) {
+  SourceOptions options;
+  const CameraConfig& c = config.camera;
+  if (c.fx > 0)
+    options.dataset.camera = CameraModel{{c.fx, c.fy, c.cx, c.cy, 0, 0}, {c.k1, c.k2, c.p1, c.p2, c.k3}};
+  options.dataset.depth_units_per_m = c.depth_units_per_m;
+  options.dataset.time_offset_ms = static_cast<double>(config.source.time_offset_ms);
+  options.dataset.max_pair_ms = static_cast<double>(config.source.max_pair_ms);
+  options.threads = config.runtime.threads;
+  return options;
+}
+
 FrameSlot::FrameSlot(const SourceInfo& info) {
   const int32_t rows = info.camera.k.height, cols = info.camera.k.width;
   const auto pixels = static_cast<size_t>(rows) * static_cast<size_t>(cols);

@@ -9,6 +9,7 @@
 
 #include "config/config.hpp"
 #include "config/result.hpp"
+#include "drivers/registry.hpp"
 #include "runtime/ports/frame_source.hpp"
 
 namespace stillmap {
@@ -19,6 +20,9 @@ Result<Config> read_config(const std::string& path, const std::vector<std::strin
 
 /// @return an error of kind bad_usage that lists every violation, one a line
 Result<Done> check(const Config& config);
+
+/// What a source has to be told: the camera and the stamps where the configuration overrides them.
+SourceOptions source_options(const Config& config);
 
 /// Memory of one frame with the size that a source says.
 class FrameSlot {

@@ -82,8 +82,10 @@ TEST(HeapGuard, SeesEveryWayToAllocateInEveryThread) {
 
 TEST(Pipeline, DoesNotAllocateIn300FramesWorkersIncluded) {
   Config config;
-  config.map.pool_blocks = 60000;
-  auto source = open_source("synthetic:crowd,size=160x120,seconds=11", source_options(config));
+  config.map.pool_blocks = 20000;
+  config.map.voxel_m = 0.04f;  // a coarse map: what is looked for does not depend on it
+  config.map.truncation_m = 0.16f;
+  auto source = open_source("synthetic:crowd,size=160x120,seconds=11", SourceOptions{});
   ASSERT_TRUE(source) << source.error();
   const SourceInfo& info = (*source)->info();
   const std::unique_ptr<Engine> engine =

@@ -1,0 +1,429 @@
+#!/usr/bin/env python3
+"""The program as its users call it: exit codes, messages, the files that a run leaves, stops and full disks.
+
+    command_line_test.py PROGRAM SOURCE_ROOT VERSION
+"""
+
+import csv
+import json
+import math
+import os
+import pathlib
+import resource
+import shutil
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+PROGRAM, ROOT, VERSION = sys.argv[1:4]
+DATA = pathlib.Path(ROOT).parent / "shared" / "data"
+SMALL = "synthetic:crowd,size=160x120,seconds=1"
+# A coarse map: small in memory and quick, and nothing here depends on its voxels.
+LITTLE = ["--set", "map.pool_blocks=20000", "--set", "map.voxel_m=0.03", "--set", "map.truncation_m=0.12"]
+
+STATES = ["stamp", "state", "p_good", "inlier_ratio", "masked_fraction"]
+TIMING = ["stamp", "prepare_ms", "track_ms", "mask_ms", "refine_ms", "integrate_ms", "total_ms"]
+
+
+def stillmap(*arguments, timeout=300, **options):
+    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=timeout, **options)
+
+
+def read_ply(path):
+    """Vertices and triangles of a mesh as the contract describes it."""
+    data = pathlib.Path(path).read_bytes()
+    head, body = data.split(b"end_header\n", 1)
+    lines = head.decode().splitlines()
+    assert lines[:2] == ["ply", "format binary_little_endian 1.0"], lines[:2]
+    counts = {line.split()[1]: int(line.split()[2]) for line in lines if line.startswith("element")}
+    properties = [line for line in lines if line.startswith("property")]
+    if "face" not in counts:
+        assert properties == ["property float x", "property float y", "property float z"], properties
+        assert len(body) == 12 * counts["vertex"]
+        return counts["vertex"], 0
+    assert properties == [
+        "property float x", "property float y", "property float z",
+        "property uchar red", "property uchar green", "property uchar blue",
+        "property list uchar int vertex_indices"], properties
+    assert len(body) == 15 * counts["vertex"] + 13 * counts["face"], "the body has another size than the header says"
+    for face in range(counts["face"]):
+        n, a, b, c = struct.unpack_from("<Biii", body, 15 * counts["vertex"] + 13 * face)
+        assert n == 3 and 0 <= min(a, b, c) and max(a, b, c) < counts["vertex"]
+    return counts["vertex"], counts["face"]
+
+
+def read_trajectory(path):
+    lines = pathlib.Path(path).read_text().splitlines()
+    poses = [[float(x) for x in line.split()] for line in lines]
+    for line, pose in zip(lines, poses):
+        assert len(pose) == 8, line
+        assert len(line.split()[0].split(".")[1]) == 6, f"stamp without six digits: {line}"
+        assert abs(math.hypot(*pose[4:]) - 1) < 1e-6, f"no unit quaternion: {line}"
+    return poses
+
+
+class Case(unittest.TestCase):
+    def setUp(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="stillmap-system-"))
+        self.addCleanup(shutil.rmtree, self.folder, ignore_errors=True)
+        self.out = self.folder / "out"
+
+    def refused(self, code, *arguments, says=(), **options):
+        done = stillmap(*arguments, **options)
+        self.assertEqual(done.returncode, code, done.stdout + done.stderr)
+        for word in says:
+            self.assertIn(word, done.stderr)
+        self.assertNotIn("terminate called", done.stderr)
+        return done
+
+    def mapped(self, *arguments, code=0, **options):
+        done = stillmap("run", *arguments, *LITTLE, **options)
+        self.assertEqual(done.returncode, code, done.stdout + done.stderr)
+        return done
+
+
+class Usage(Case):
+    def test_help_and_version(self):
+        done = stillmap("--help")
+        self.assertEqual(done.returncode, 0)
+        for name in ["run", "evaluate", "bench", "render", "picture", "memory-plan", "check-config", "mesh", "replay",
+                     "top", "doctor"]:
+            self.assertIn(name, done.stdout)
+            self.assertEqual(stillmap(name, "--help").returncode, 0, name)
+        done = stillmap("--version")
+        self.assertEqual((done.returncode, done.stdout.strip()), (0, f"stillmap {VERSION}"))
+
+    def test_bad_usage_is_2(self):
+        self.refused(2)
+        self.refused(2, "fly", says=["fly"])
+        self.refused(2, "run", says=["--source"])
+        self.refused(2, "run", "--source", SMALL, "--frobnicate", says=["--frobnicate"])
+        self.refused(2, "run", "--source", SMALL, "--max-frames", "many", says=["--max-frames"])
+        self.refused(2, "run", "--source", SMALL, "--device", "tpu", says=["--device"])
+        self.refused(2, "run", "--source", SMALL, "--threads", "0", says=["--threads"])
+        self.refused(2, "run", "--source", SMALL, "--threads", "2.5", says=["--threads"])
+        self.refused(2, "run", "--source", SMALL, "--depth-scale", "nan", says=["--depth-scale"])
+        self.refused(2, "run", "--source", SMALL, "--depth-scale", "-5000", says=["--depth-scale"])
+        self.refused(2, "run", "--source", SMALL, "--camera", "500,500,80", says=["--camera"])
+        self.refused(2, "run", "--source", SMALL, "--camera", "nan,500,80,60", says=["--camera"])
+        self.refused(2, "run", "--source", SMALL, "--camera", "0,500,80,60", says=["--camera"])
+        self.refused(2, "run", "--source", SMALL, "--initial-pose", "0,0,0,0,0,0,0", says=["--initial-pose"])
+        self.refused(2, "run", "--source", SMALL, "--initial-pose", "1,2,3", says=["--initial-pose"])
+        self.refused(2, "run", "--source", "nothing", says=["nothing"])
+        self.refused(2, "run", "--source", "synthetic:no_such_scene", says=["no_such_scene"])
+
+    def test_parts_that_are_not_built_say_so(self):
+        for arguments in [["run", "--source", SMALL, "--device", "cuda"],
+                          ["run", "--source", SMALL, "--lcm", "udpm://239.255.76.67:7667?ttl=0"],
+                          ["run", "--source", SMALL, "--map", "a.smap"],
+                          ["run", "--source", SMALL, "--realtime"],
+                          ["run", "--source", SMALL, "--set", "record.log=true"],
+                          ["run", "--source", SMALL, "--set", "record.map=true"],
+                          ["run", "--source", "xtion"],
+                          ["mesh", "a.smap", "--out", "b.ply"], ["replay", "a.lcm"], ["top"], ["doctor"],
+                          ["bench", "scale"], ["bench", "soak"]]:
+            done = self.refused(2, *arguments)
+            self.assertIn("build", done.stderr, arguments)
+
+    def test_configuration(self):
+        config = self.folder / "c.toml"
+        config.write_text("[track]\ncolour_wait = 1\n[nowhere]\nx = 1\n")
+        self.refused(2, "run", "--source", SMALL, "--config", config, says=["colour_wait", "nowhere"])
+        self.refused(2, "check-config", config, says=["colour_wait", "nowhere", str(config)])
+        config.write_text("[mask]\ngamma = 7\n[map]\nvoxel_m = 0.5\n")
+        self.refused(2, "check-config", config, says=["mask.gamma", "7", "map.truncation_m"])
+        config.write_text("[mask]\ngamma = 0.4\n")
+        self.assertEqual(stillmap("check-config", config).returncode, 0)
+        self.refused(2, "check-config", self.folder / "missing.toml", says=["missing.toml"])
+        self.refused(2, "run", "--source", SMALL, "--set", "track.levels", says=["track.levels"])
+        self.refused(2, "run", "--source", SMALL, "--set", "track.levels=9", "--set", "mask.gamma=2",
+                     says=["track.levels", "mask.gamma"])
+        for preset in sorted((pathlib.Path(ROOT) / "config/presets").glob("*.toml")):
+            done = stillmap("check-config", preset)
+            self.assertEqual(done.returncode, 0, done.stderr)
+
+    def test_memory_plan(self):
+        done = stillmap("memory-plan")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("total", done.stdout)
+        paper = pathlib.Path(ROOT) / "config/presets/paper.toml"
+        done = stillmap("memory-plan", "--config", paper)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.refused(2, "memory-plan", "--set", "memory.budget_mb=10", says=["memory.budget_mb"])
+        done = self.refused(2, "run", "--source", SMALL, "--set", "memory.budget_mb=10", "--out", self.out,
+                            says=["memory.budget_mb", "total"])
+        self.assertFalse(self.out.exists())
+
+
+class Sources(Case):
+    def test_missing_source_is_3(self):
+        self.refused(3, "run", "--source", f"tum:{self.folder}/none", "--out", self.out, says=["none"])
+        self.refused(3, "run", "--source", f"sevenscenes:{self.folder}/none", says=["none"])
+        self.assertFalse(self.out.exists(), "nothing may be made for a source that is not there")
+
+    def test_waits_for_the_source(self):
+        start = time.monotonic()
+        self.refused(3, "run", "--source", f"tum:{self.folder}/none", "--set", "source.wait_s=1")
+        self.assertGreater(time.monotonic() - start, 0.9)
+
+    def test_render_then_map_with_a_bad_frame_in_the_middle(self):
+        clip = self.folder / "clip"
+        done = stillmap("render", "--source", SMALL, "--out", clip)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for name in ["rgb.txt", "depth.txt", "associated.txt", "groundtruth.txt", "camera.toml", "truth_cloud.ply"]:
+            self.assertTrue((clip / name).stat().st_size > 0, name)
+        depth = sorted((clip / "depth").glob("*.png"))
+        self.assertEqual(len(depth), 30)
+        self.assertEqual(len(list((clip / "rgb").glob("*.png"))), 30)
+        self.assertEqual(len(list((clip / "masks_truth").glob("*.png"))), 30)
+
+        self.mapped("--source", f"tum:{clip}", "--out", self.out)
+        whole = read_trajectory(self.out / "trajectory.txt")
+        self.assertEqual(len(whole), 30)
+        # The folder and the scene itself are the same frames: the same trajectory to the last digit.
+        self.mapped("--source", SMALL, "--out", self.folder / "direct")
+        self.assertEqual(whole, read_trajectory(self.folder / "direct/trajectory.txt"))
+
+        depth[10].write_bytes(depth[10].read_bytes()[:200])
+        depth[15].unlink()
+        done = self.mapped("--source", f"tum:{clip}", "--out", self.out)
+        self.assertIn(depth[10].name, done.stderr)
+        self.assertEqual(len(read_trajectory(self.out / "trajectory.txt")), 28)
+        report = json.loads((self.out / "report.json").read_text())
+        self.assertEqual((report["frames"], report["faults"]["bad_frame"]), (28, 2))
+        events = (self.out / "events.log").read_text()
+        self.assertIn(depth[10].name, events)
+        self.assertIn(depth[15].name, events)
+
+        (clip / "camera.toml").unlink()
+        self.refused(2, "run", "--source", f"tum:{clip}", says=["camera"])
+        self.mapped("--source", f"tum:{clip}", "--camera", "131.25,131.25,79.75,59.75", "--max-frames", "3")
+
+        for name in ["associated.txt", "rgb.txt", "depth.txt"]:
+            (clip / name).write_text("# nothing\n")
+        self.refused(3, "run", "--source", f"tum:{clip}", "--camera", "131,131,80,60")
+
+    def test_render_refuses(self):
+        self.refused(2, "render", "--source", "tum:x", "--out", self.out, says=["synthetic"])
+        self.refused(1, "render", "--source", SMALL, "--out", "/proc/no", says=["/proc/no"])
+
+    @unittest.skipUnless(DATA.is_dir(), "no recordings here")
+    def test_real_recordings(self):
+        for source, truth in [(f"sevenscenes:{DATA}/kitchen_clip", DATA / "kitchen_clip/groundtruth.txt"),
+                              (f"tum:{DATA}/rpy_clip", DATA / "rpy_clip/groundtruth.txt"),
+                              (f"tum:{DATA}/kitchen_walkers", DATA / "kitchen_walkers/groundtruth.txt")]:
+            with self.subTest(source):
+                done = stillmap("run", "--source", source, "--out", self.out, "--max-frames", 12)
+                self.assertEqual(done.returncode, 0, done.stderr)
+                self.assertEqual(len(read_trajectory(self.out / "trajectory.txt")), 12)
+                done = stillmap("evaluate", "ate", "--truth", truth, "--estimate", self.out / "trajectory.txt", "--json")
+                self.assertEqual(done.returncode, 0, done.stderr)
+                vertices, triangles = read_ply(self.out / "mesh.ply")
+                self.assertGreater(triangles, 1000)
+
+
+class Outputs(Case):
+    def test_every_file_of_the_contract(self):
+        done = self.mapped("--source", SMALL, "--out", self.out, "--set", "record.masks=true", "--threads", "2")
+        self.assertEqual(list(self.out.glob("**/*.part")), [])
+        poses = read_trajectory(self.out / "trajectory.txt")
+        self.assertEqual(len(poses), 30)
+        self.assertEqual(poses[0][1:], [0, 0, 0, 0, 0, 0, 1])
+        truth = read_trajectory(self.out / "truth.txt")
+        self.assertEqual([p[0] for p in truth], [p[0] for p in poses])
+        self.assertTrue(all(abs(a - b) < 1e-6 for a, b in zip(truth[0], poses[0])))
+        for pose, true_pose in zip(poses, truth):
+            self.assertLess(math.dist(pose[1:4], true_pose[1:4]), 0.1)
+
+        states = list(csv.reader((self.out / "states.csv").open()))
+        self.assertEqual(states[0][:5], STATES)
+        self.assertEqual({len(row) for row in states}, {5 + 21})
+        self.assertEqual(len(states), 31)
+        self.assertTrue({row[1] for row in states[1:]} <= {"good", "poor", "lost"})
+        timing = list(csv.reader((self.out / "timing.csv").open()))
+        self.assertEqual((timing[0], len(timing)), (TIMING, 31))
+
+        vertices, triangles = read_ply(self.out / "mesh.ply")
+        self.assertGreater(min(vertices, triangles), 100)
+        self.assertGreater(read_ply(self.out / "truth_cloud.ply")[0], 1000)
+        self.assertEqual(len(list((self.out / "masks").glob("*.png"))), 29 + 1)
+        self.assertEqual(len(list((self.out / "masks_truth").glob("*.png"))), 30)
+        stamp = f"{poses[-1][0]:.6f}"
+        self.assertTrue((self.out / "masks" / f"{stamp}.png").exists())
+        for kind in ["colour", "mask", "map"]:
+            self.assertEqual(len(list((self.out / "snapshots").glob(f"*_{kind}.png"))), 8)
+            self.assertTrue((self.out / "snapshots" / f"{stamp}_{kind}.png").exists())
+        self.assertIn("start", (self.out / "events.log").read_text())
+        self.assertEqual(stillmap("check-config", self.out / "config.toml").returncode, 0)
+
+        report = json.loads((self.out / "report.json").read_text())
+        self.assertEqual(list(report), ["version", "device", "threads", "frames", "dropped", "lost_frames", "relocalised",
+                                        "ms", "map", "memory", "heap_allocations_in_loop", "deadline_misses",
+                                        "masked_fraction_mean", "faults"])
+        self.assertEqual((report["version"], report["device"], report["threads"]), (VERSION, "cpu", 2))
+        self.assertEqual((report["frames"], report["dropped"], report["heap_allocations_in_loop"]), (30, 0, 0))
+        for step in ["prepare", "track", "mask", "refine", "integrate", "total"]:
+            self.assertEqual(list(report["ms"][step]), ["mean", "p50", "p95", "p99", "max"])
+        self.assertGreater(report["ms"]["total"]["p50"], 0)
+        self.assertEqual(list(report["map"]), ["blocks", "free_blocks", "capacity", "bytes", "archived"])
+        self.assertEqual(report["map"]["blocks"] + report["map"]["free_blocks"], report["map"]["capacity"])
+        self.assertGreater(report["memory"]["peak_rss_bytes"], 1 << 20)
+
+        self.assertIn("30 frames", done.stdout)
+        done = stillmap("evaluate", "ate", "--truth", self.out / "truth.txt", "--estimate", self.out / "trajectory.txt")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        done = stillmap("evaluate", "model", "--truth", self.out / "truth_cloud.ply", "--mesh", self.out / "mesh.ply")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        done = stillmap("picture", self.out)
+        self.assertEqual(done.returncode, 0, done.stderr)
+
+    def test_same_input_same_bytes_with_any_number_of_threads(self):
+        for threads in ["1", "3"]:
+            self.mapped("--source", SMALL, "--out", self.folder / threads, "--threads", threads, "--max-frames", "15")
+        for name in ["trajectory.txt", "states.csv", "mesh.ply", "truth.txt"]:
+            self.assertEqual((self.folder / "1" / name).read_bytes(), (self.folder / "3" / name).read_bytes(), name)
+
+    def test_earlier_runs_move_away(self):
+        for frames in [2, 3, 4]:
+            self.mapped("--source", SMALL, "--out", self.out, "--max-frames", frames, "--set", "record.keep_previous=2")
+        count = lambda folder: len(read_trajectory(self.out / folder / "trajectory.txt"))
+        self.assertEqual((count("."), count("previous-1"), count("previous-2")), (4, 3, 2))
+        self.assertTrue((self.out / "previous-1/report.json").exists())
+
+    def test_flags(self):
+        self.mapped("--source", SMALL, "--out", self.out, "--skip-frames", "5", "--max-frames", "4", "--lcm", "off",
+                    "--device", "auto", "--initial-pose", "-1,2,3,0,0,1,1", "--set", "record.mesh=false", "--set",
+                    "record.snapshots=0")
+        poses = read_trajectory(self.out / "trajectory.txt")
+        self.assertEqual(len(poses), 4)
+        self.assertAlmostEqual(poses[0][0], 5 / 30, places=5)
+        for value, expected in zip(poses[0][1:], [-1, 2, 3, 0, 0, 2**-0.5, 2**-0.5]):
+            self.assertAlmostEqual(value, expected, places=6)
+        truth = read_trajectory(self.out / "truth.txt")
+        self.assertAlmostEqual(truth[0][1], -1, places=6)
+        self.assertFalse((self.out / "mesh.ply").exists())
+        self.assertFalse((self.out / "snapshots").exists())
+
+    def test_quiet_says_nothing(self):
+        done = self.mapped("--source", SMALL, "--max-frames", "3", "--quiet")
+        self.assertEqual(done.stdout + done.stderr, "")
+
+    def test_without_out_nothing_is_written(self):
+        done = stillmap("run", "--source", SMALL, "--max-frames", "3", *LITTLE, cwd=self.folder)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(list(self.folder.iterdir()), [])
+
+
+class Trouble(Case):
+    def test_folder_that_cannot_be_written(self):
+        self.refused(1, "run", "--source", SMALL, *LITTLE, "--out", "/proc/no/such", says=["/proc/no"])
+        blocked = self.folder / "file"
+        blocked.write_text("x")
+        self.refused(1, "run", "--source", SMALL, *LITTLE, "--out", blocked, says=[str(blocked)])
+        if os.geteuid() != 0:
+            closed = self.folder / "closed"
+            closed.mkdir(mode=0o500)
+            self.refused(1, "run", "--source", SMALL, *LITTLE, "--out", closed, says=[str(closed), "ermission"])
+
+    def test_full_disk_keeps_what_is_whole(self):
+        def limit():
+            resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))
+
+        # The folder itself takes a few small files, then every file ends at 2000 bytes.
+        done = stillmap("run", "--source", SMALL, *LITTLE, "--out", self.out, "--set", "record.snapshots=0",
+                        preexec_fn=limit)
+        self.assertEqual(done.returncode, 1, done.stdout + done.stderr)
+        self.assertIn("File too large", done.stderr)
+        self.assertNotIn("terminate", done.stderr)
+
+    def test_disk_that_fills_up_during_the_run(self):
+        def limit():
+            resource.setrlimit(resource.RLIMIT_FSIZE, (12000, 12000))
+
+        done = stillmap("run", "--source", "synthetic:crowd,size=160x120,seconds=6", *LITTLE, "--out", self.out,
+                        preexec_fn=limit)
+        self.assertEqual(done.returncode, 1, done.stdout + done.stderr)
+        for name in ["trajectory.txt", "states.csv", "mesh.ply"]:
+            self.assertEqual(done.stderr.count(f"{self.out}/{name}:"), 1, f"{name} is not reported once: {done.stderr}")
+        self.assertFalse((self.out / "mesh.ply").exists())
+        self.assertEqual(list(self.out.glob("*.part")), [])
+        text = (self.out / "trajectory.txt").read_text()
+        self.assertTrue(text.endswith("\n"))
+        self.assertGreater(len(read_trajectory(self.out / "trajectory.txt")), 50)
+        rows = list(csv.reader((self.out / "states.csv").open()))
+        self.assertEqual({len(row) for row in rows}, {26})
+        report = json.loads((self.out / "report.json").read_text())
+        self.assertEqual(report["frames"], 180)
+        self.assertGreaterEqual(report["faults"]["record_failed"], 3)
+
+    def stop(self, number):
+        run = subprocess.Popen([PROGRAM, "run", "--source", "synthetic:crowd,size=160x120,seconds=10000", *LITTLE,
+                                "--out", self.out], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(run.kill)
+        part = self.out / "trajectory.txt.part"
+        deadline = time.monotonic() + 60
+        while not (part.exists() and part.stat().st_size > 2000) and time.monotonic() < deadline:
+            time.sleep(0.02)
+        run.send_signal(number)
+        out, err = run.communicate(timeout=60)
+        self.assertEqual(run.returncode, 0, out + err)
+        self.assertEqual(list(self.out.glob("*.part")), [])
+        frames = len(read_trajectory(self.out / "trajectory.txt"))
+        self.assertGreater(frames, 5)
+        self.assertEqual(json.loads((self.out / "report.json").read_text())["frames"], frames)
+        self.assertGreater(read_ply(self.out / "mesh.ply")[1], 100)
+
+    def test_interrupt_finishes_everything(self):
+        self.stop(signal.SIGINT)
+
+    def test_terminate_finishes_everything(self):
+        self.stop(signal.SIGTERM)
+
+    def test_second_interrupt_stops_at_once(self):
+        # While it waits for a source it cannot finish anything: the first one ends it with 0.
+        run = subprocess.Popen([PROGRAM, "run", "--source", f"tum:{self.folder}/none", "--set", "source.wait_s=-1"],
+                               stderr=subprocess.PIPE)
+        self.addCleanup(run.kill)
+        time.sleep(0.5)
+        run.send_signal(signal.SIGINT)
+        self.assertEqual(run.wait(timeout=10), 0)
+        run.stderr.close()
+
+    def test_progress_goes_into_a_pipe_line_by_line(self):
+        done = self.mapped("--source", "synthetic:crowd,size=320x240,seconds=4")
+        lines = [line for line in done.stdout.splitlines() if line.startswith("frame ")]
+        self.assertGreater(len(lines), 0)
+        self.assertNotIn("\r", done.stdout)
+        for word in ["/120", "frames/s", "tracking", "map"]:
+            self.assertIn(word, lines[0])
+
+    def test_reader_that_went_away_does_not_end_the_run(self):
+        run = subprocess.Popen([PROGRAM, "run", "--source", SMALL, *LITTLE, "--out", self.out], stdout=subprocess.PIPE)
+        run.stdout.close()
+        self.assertEqual(run.wait(timeout=120), 0)
+        self.assertEqual(len(read_trajectory(self.out / "trajectory.txt")), 30)
+
+
+class Bench(Case):
+    def test_steps(self):
+        done = stillmap("bench", "steps", "--source", SMALL, "--frames", "10", "--json", *LITTLE)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        report = json.loads(done.stdout)
+        self.assertEqual(report["frames"], 10)
+        self.assertGreater(report["ms"]["total"]["p50"], 0)
+
+    def test_accuracy(self):
+        done = stillmap("bench", "accuracy", "--source", "synthetic:static,size=160x120,seconds=1", "--json", *LITTLE,
+                        "--out", self.out)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        row = json.loads(done.stdout)[0]
+        self.assertEqual((row["frames"], row["exit_code"]), (30, 0))
+        self.assertLess(row["ate_rmse_m"], 0.05)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1] + sys.argv[4:], verbosity=2)
