@@ -25,11 +25,11 @@ void bare_room(World& world);
 /// Where a person is. The body is about 1.75 m tall, 0.55 m wide, and reaches 0.3 m to the front when
 /// walking.
 struct Stance {
-  Vec3 feet_m;         ///< between the feet, on the floor
-  float yaw = 0;       ///< radians, where the body faces
-  float stride = 0;    ///< 0 standing, 1 a fast walk
-  float phase = 0;     ///< radians, of the walk cycle
-  bool holds = false;  ///< the hands are at `left_hand_m` and `right_hand_m`
+  Vec3 feet_m;       ///< between the feet, on the floor
+  float yaw = 0;     ///< radians, where the body faces
+  float stride = 0;  ///< 0 standing, 1 a fast walk
+  float phase = 0;   ///< radians, of the walk cycle
+  float grip = 0;    ///< 0: the arms swing; 1: the hands are at `left_hand_m` and `right_hand_m`
   Vec3 left_hand_m, right_hand_m;
 };
 

@@ -83,19 +83,17 @@ void add_leg(Body& body, float side, float phase, float stride, const Material& 
 
 void add_arm(Body& body, float side, float phase, const Stance& stance, const Clothes& clothes) {
   const Vec3 shoulder = {0.0f, 0.22f * side, 1.41f};
-  Vec3 elbow, hand;
-  if (stance.holds) {
-    hand = body.to_body(side > 0 ? stance.left_hand_m : stance.right_hand_m);
+  const float swing = 0.45f * stance.stride * std::sin(phase);
+  Vec3 elbow = shoulder + 0.29f * Vec3{std::sin(swing), 0.16f * side, -std::cos(swing)};
+  const float forearm = swing + 0.25f + 0.35f * stance.stride;
+  Vec3 hand = elbow + 0.26f * Vec3{std::sin(forearm), 0.0f, -std::cos(forearm)};
+  if (stance.grip > 0.0f) {
     // An arm is 0.56 m: a hand farther away stays where the arm can reach.
-    const Vec3 reach = hand - shoulder;
-    const float length = norm(reach);
-    if (length > 0.56f) hand = shoulder + (0.56f / length) * reach;
-    elbow = 0.5f * (shoulder + hand) + Vec3{-0.03f, 0.09f * side, -0.09f};
-  } else {
-    const float swing = 0.45f * stance.stride * std::sin(phase);
-    elbow = shoulder + 0.29f * Vec3{std::sin(swing), 0.16f * side, -std::cos(swing)};
-    const float forearm = swing + 0.25f + 0.35f * stance.stride;
-    hand = elbow + 0.26f * Vec3{std::sin(forearm), 0.0f, -std::cos(forearm)};
+    Vec3 reach = body.to_body(side > 0 ? stance.left_hand_m : stance.right_hand_m) - shoulder;
+    reach = std::min(1.0f, 0.56f / norm(reach)) * reach;
+    const Vec3 bent = shoulder + 0.5f * reach + Vec3{-0.03f, 0.09f * side, -0.09f};
+    hand = hand + stance.grip * (shoulder + reach - hand);
+    elbow = elbow + stance.grip * (bent - elbow);
   }
   const Material skin = {Pattern::plain, clothes.skin, {}, 0.1f, 0};
   body.limb(shoulder, elbow, 0.055f, clothes.shirt);

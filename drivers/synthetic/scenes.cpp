@@ -30,14 +30,14 @@ void add_box(World& world, Vec3 centre, Vec3 half, float yaw, const Material& ma
 }
 
 /// The hands at the two sides of a box whose width is along its local y.
-void hold(Stance& person, Vec3 centre, Vec3 half, float box_yaw, float height_m) {
+void hold(Stance& person, Vec3 centre, Vec3 half, float box_yaw, float height_m, double grip = 1.0) {
   const Vec3 side = yaw_rotation(box_yaw) * Vec3{0, half.y + 0.03f, 0};
-  const Vec3 grip = centre + Vec3{0, 0, height_m};
+  const Vec3 at = centre + Vec3{0, 0, height_m};
   const Vec3 left = {-std::sin(person.yaw), std::cos(person.yaw), 0};
   const bool same_side = dot(left, side) > 0.0f;
-  person.holds = true;
-  person.left_hand_m = same_side ? grip + side : grip - side;
-  person.right_hand_m = same_side ? grip - side : grip + side;
+  person.grip = static_cast<float>(grip);
+  person.left_hand_m = same_side ? at + side : at - side;
+  person.right_hand_m = same_side ? at - side : at + side;
 }
 
 void no_movers(double, World&) {}
@@ -74,7 +74,7 @@ constexpr float kBalloonM = 0.30f;
 
 void add_balloon_and_person(World& world, const Stance& stance, Vec3 balloon) {
   Stance person = stance;
-  person.holds = true;  // hands below the balloon, ready to push it up
+  person.grip = 1.0f;  // hands below the balloon, ready to push it up
   const Vec3 side = {-0.16f * std::sin(stance.yaw), 0.16f * std::cos(stance.yaw), 0};
   const Vec3 under = balloon - Vec3{0, 0, 0.8f * kBalloonM};
   person.left_hand_m = under + side;
@@ -191,7 +191,7 @@ void crowd_close_movers(double t, World& world) {
                                 {0.22 + 0.04 * wave(s, 3.3), 0.60 * wave(s, 4.7, 0.4)}};
       return mixed(wings[who], near_by[who], rise(from[who], to[who], s));
     };
-    add_person(world, walk(path, t, {-0.15, 0}), static_cast<uint32_t>(2 + who));
+    add_person(world, walk(path, t, {-0.25, 0}), static_cast<uint32_t>(2 + who));
   }
 }
 
@@ -310,7 +310,8 @@ void placing_movers(double t, World& world) {
   const Vec3 centre = t < 6.0 ? carried + down * (at_rest() - carried) : at_rest();
   const auto yaw = static_cast<float>((1.0 - static_cast<double>(down)) * static_cast<double>(person.yaw) +
                                       static_cast<double>(down) * 0.25 * kTurn);
-  if (t < 6.2) hold(person, centre, kCartonHalf, t < 6.0 ? yaw : static_cast<float>(0.25 * kTurn), -0.02f);
+  hold(person, centre, kCartonHalf, t < 6.0 ? yaw : static_cast<float>(0.25 * kTurn), -0.02f,
+       1.0 - rise(6.05, 6.7, t));
   add_person(world, person, 1);
   add_box(world, centre, kCartonHalf, t < 6.0 ? yaw : static_cast<float>(0.25 * kTurn), kCarton, t < 6.0);
 }
@@ -325,7 +326,7 @@ void carry_off(double t, double come_s, double take_s, double leave_s, uint32_t 
                                           {take_s - 0.3, before_stand},
                                           {take_s + 0.9, before_stand},
                                           {take_s + 2.6, {-0.15, -0.55}}}};
-    const Spot2 about = stroll(s - take_s - 1.8) + Spot2{0.20, 0.0};
+    const Spot2 about = stroll(s - take_s - 1.8) + Spot2{0.22, 0.0};
     const Spot2 walk_about = mixed(along(way, s), about, rise(take_s + 1.9, take_s + 3.4, s));
     return mixed(walk_about, Spot2{-0.10, -1.16}, rise(leave_s, leave_s + 1.8, s));
   };
@@ -335,7 +336,7 @@ void carry_off(double t, double come_s, double take_s, double leave_s, uint32_t 
   const Vec3 centre = at_rest() + up * (before(person, 0.43f, 1.20f) - at_rest());
   const auto rest_yaw = static_cast<float>(0.25 * kTurn);
   const float yaw = rest_yaw + up * (person.yaw - rest_yaw);
-  if (t > take_s - 0.3) hold(person, centre, kCartonHalf, yaw, -0.02f);
+  hold(person, centre, kCartonHalf, yaw, -0.02f, rise(take_s - 0.7, take_s - 0.05, t));
   add_person(world, person, look_number);
   add_box(world, centre, kCartonHalf, yaw, kCarton, t > take_s);
 }
@@ -369,7 +370,7 @@ void placing_obstructing_movers(double t, World& world) {
     return mixed(behind, Spot2{0.35 + 0.1 * wave(s, 4.1), 0.72 * wave(s - 8.0, 4.4)}, rise(7.9, 9.4, s));
   };
   Stance person = walk(path, t, mixed({-2.0, 0.0}, {-0.4, 0.0}, rise(7.7, 8.4, t)));
-  if (t < 7.8) hold(person, centre, kCrateHalf, yaw, 0.45f);
+  hold(person, centre, kCrateHalf, yaw, 0.45f, 1.0 - rise(7.65, 8.3, t));
   add_person(world, person, 3);
   const Stance helper = walk(
       [](double s) {

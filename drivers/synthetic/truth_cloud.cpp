@@ -78,7 +78,7 @@ bool hidden(const World& world, size_t own, Vec3 p_world) {
     if (i == own || other.moving) continue;
     const Vec3 from_centre = p_world - other.T_world_local.translation;
     const Vec3 h = other.half_m;
-    const float reach = h.x + h.y + h.z + kHiddenM;
+    const float reach = (other.kind == Kind::capsule ? h.x + h.z : norm(h)) + kHiddenM;
     if (other.kind != Kind::room && dot(from_centre, from_centre) > reach * reach) continue;
     if (distance_m(other, p_world) < kHiddenM) return true;
   }

@@ -1,0 +1,286 @@
+// What the scenes promise: how much moves, how fast the camera is, and that nothing passes through anything.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "drivers/synthetic/renderer.hpp"
+#include "drivers/synthetic/scene.hpp"
+#include "drivers/synthetic/sensor_model.hpp"
+
+namespace stillmap::synthetic {
+namespace {
+
+constexpr Intrinsics kCamera = {65.625f, 65.625f, 39.5f, 29.5f, 80, 60};
+constexpr double kFrame_s = 1.0 / 30.0;
+
+/// Shares of the pixels of one instant.
+struct Shares {
+  double t_s = 0;
+  double moving = 0;       ///< of all pixels
+  double still_valid = 0;  ///< of the pixels within the sensor's range
+};
+
+std::vector<Shares> shares_over(const Scene& scene, double step_s) {
+  Workers workers(2);
+  Renderer renderer(kCamera);
+  IdealImages images;
+  std::vector<Shares> all;
+  for (double t = 0; t < scene.default_seconds; t += step_s) {
+    renderer.render(world_at(scene, t, false), scene.camera(t), workers, images);
+    int moving = 0, valid = 0, still = 0;
+    for (size_t i = 0; i < images.mask.size(); ++i) {
+      moving += images.mask[i] != 0 ? 1 : 0;
+      if (images.depth_m[i] < kDepthMinM || images.depth_m[i] > kDepthMaxM) continue;
+      ++valid;
+      still += images.mask[i] == 0 ? 1 : 0;
+    }
+    all.push_back({t, static_cast<double>(moving) / static_cast<double>(images.mask.size()),
+                   static_cast<double>(still) / std::max(valid, 1)});
+  }
+  return all;
+}
+
+double degrees_between(const Se3d& a, const Se3d& b) {
+  return norm(log_rotation(transposed(a.rotation) * b.rotation)) * 57.29577951308232;
+}
+
+struct Pace {
+  double m_per_s = 0, deg_per_s = 0, most_deg_per_frame = 0, most_m_per_frame = 0;
+};
+
+Pace pace_of(const Scene& scene) {
+  Pace pace;
+  const int frames = static_cast<int>(scene.default_seconds * 30.0) - 1;
+  for (int i = 0; i < frames; ++i) {
+    const Se3d a = scene.camera(i * kFrame_s), b = scene.camera((i + 1) * kFrame_s);
+    const double metres = norm(b.translation - a.translation), degrees = degrees_between(a, b);
+    pace.m_per_s += metres * 30.0 / frames;
+    pace.deg_per_s += degrees * 30.0 / frames;
+    pace.most_deg_per_frame = std::max(pace.most_deg_per_frame, degrees);
+    pace.most_m_per_frame = std::max(pace.most_m_per_frame, metres);
+  }
+  return pace;
+}
+
+const Scene& scene_named(const char* name) {
+  const Scene* scene = find_scene(name);
+  EXPECT_NE(scene, nullptr) << name;
+  return *scene;
+}
+
+class EveryScene : public testing::TestWithParam<const char*> {};
+
+TEST_P(EveryScene, camera_is_brisk_but_smooth) {
+  const Scene& scene = scene_named(GetParam());
+  const Pace pace = pace_of(scene);
+  EXPECT_TRUE(pace.m_per_s >= 0.2 || pace.deg_per_s >= 15.0)
+      << pace.m_per_s << " m/s " << pace.deg_per_s << " deg/s";
+  EXPECT_LT(pace.most_m_per_frame, 0.04);
+  EXPECT_LT(pace.most_deg_per_frame, std::string(scene.name) == "fast" ? 7.5 : 3.0);
+  // From rest: the second frame is almost the first.
+  EXPECT_LT(norm(scene.camera(kFrame_s).translation - scene.camera(0).translation), 0.004);
+}
+
+TEST_P(EveryScene, movers_cover_15_percent_and_leave_enough_still) {
+  const Scene& scene = scene_named(GetParam());
+  const bool obstructs = std::string(scene.name).find("obstructing") != std::string::npos;
+  const std::vector<Shares> shares = shares_over(scene, 0.25);
+  double moving = 0, least_still = 1;
+  for (const Shares& s : shares) {
+    moving += s.moving / static_cast<double>(shares.size());
+    least_still = std::min(least_still, s.still_valid);
+  }
+  if (scene.dynamic) {
+    EXPECT_GE(moving, 0.15);
+    EXPECT_GE(least_still, obstructs ? 0.0 : 0.25);
+  } else {
+    EXPECT_EQ(moving, 0.0);
+  }
+}
+
+TEST_P(EveryScene, starts_still_unless_it_must_not) {
+  const Scene& scene = scene_named(GetParam());
+  const std::string name = scene.name;
+  const bool from_the_start = name == "crowd_start" || name == "person_tracking";
+  Workers workers(1);
+  Renderer renderer(kCamera);
+  IdealImages images;
+  for (double t = 0; t <= 1.0; t += 0.2) {
+    renderer.render(world_at(scene, t, false), scene.camera(t), workers, images);
+    const auto moving = static_cast<double>(std::count(images.mask.begin(), images.mask.end(), 255)) /
+                        static_cast<double>(images.mask.size());
+    if (from_the_start)
+      EXPECT_GT(moving, 0.15) << t;
+    else
+      EXPECT_LT(moving, 0.03) << t;
+  }
+}
+
+TEST_P(EveryScene, camera_keeps_clear_of_everything) {
+  const Scene& scene = scene_named(GetParam());
+  for (double t = 0; t < scene.default_seconds; t += 0.1) {
+    const Vec3 lens = cast<float>(scene.camera(t)).translation;
+    EXPECT_GT(lens.z, 1.1f);
+    EXPECT_LT(lens.z, 1.6f);
+    for (const Shape& shape : world_at(scene, t, false).shapes)
+      ASSERT_GE(distance_m(shape, lens), shape.moving ? 0.6f : 0.25f) << "at " << t << " s";
+  }
+}
+
+TEST_P(EveryScene, movers_do_not_pass_through_furniture) {
+  const Scene& scene = scene_named(GetParam());
+  constexpr float kTouchM = 0.08f;  // hands on a box, shoes on the carpet
+  for (double t = 0; t < scene.default_seconds; t += 0.2) {
+    const World world = world_at(scene, t, false);
+    for (const Shape& mover : world.shapes) {
+      if (!mover.moving) continue;
+      const bool capsule = mover.kind == Kind::capsule;
+      const float radius =
+          capsule ? mover.half_m.x : std::min({mover.half_m.x, mover.half_m.y, mover.half_m.z});
+      for (const float end : {-1.0f, 0.0f, 1.0f}) {
+        const Vec3 centre = mover.T_world_local * Vec3{0, 0, capsule ? end * mover.half_m.z : 0.0f};
+        for (const Shape& still : world.shapes) {
+          if (still.moving) continue;
+          ASSERT_GT(distance_m(still, centre) - radius, -kTouchM) << "at " << t << " s";
+        }
+      }
+    }
+  }
+}
+
+TEST_P(EveryScene, nothing_jumps) {
+  // The same shapes in the same order from frame to frame, each moved by little; hands and shoes are the
+  // quickest.
+  const Scene& scene = scene_named(GetParam());
+  World before = world_at(scene, 0, false);
+  for (double t = kFrame_s; t < scene.default_seconds; t += kFrame_s) {
+    const World now = world_at(scene, t, false);
+    ASSERT_EQ(now.shapes.size(), before.shapes.size());
+    for (size_t i = 0; i < now.shapes.size(); ++i) {
+      const float moved =
+          norm(now.shapes[i].T_world_local.translation - before.shapes[i].T_world_local.translation);
+      const bool limb = now.shapes[i].kind != Kind::box && now.shapes[i].half_m.x < 0.06f;
+      ASSERT_LT(moved, limb ? 0.22f : 0.12f) << "shape " << i << " at " << t << " s";
+    }
+    before = now;
+  }
+}
+
+std::vector<const char*> names() {
+  std::vector<const char*> all;
+  for (const Scene& scene : all_scenes()) all.push_back(scene.name);
+  return all;
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, EveryScene, testing::ValuesIn(names()),
+                         [](const auto& parameter) { return std::string(parameter.param); });
+
+TEST(Scenes, fast_turns_about_6_degrees_a_frame_at_times) {
+  const Pace pace = pace_of(scene_named("fast"));
+  EXPECT_GT(pace.most_deg_per_frame, 5.5);
+  EXPECT_LT(pace.deg_per_s, 90.0);  // only at times
+}
+
+TEST(Scenes, loop_comes_back_to_its_start) {
+  const Scene& scene = scene_named("loop");
+  const Se3d start = scene.camera(0);
+  double nearest = 1e9, seen_yaw = 0;
+  for (double t = 15.0; t < scene.default_seconds; t += kFrame_s)
+    nearest = std::min(nearest, norm(scene.camera(t).translation - start.translation) +
+                                    degrees_between(start, scene.camera(t)) / 57.3);
+  EXPECT_LT(nearest, 0.06);
+  for (double t = 0; t < 19.0; t += kFrame_s)
+    seen_yaw += degrees_between(scene.camera(t), scene.camera(t + kFrame_s));
+  EXPECT_GT(seen_yaw, 330.0);
+}
+
+TEST(Scenes, obstructing_box_fills_80_percent_for_two_seconds) {
+  double filled_s = 0, longest_s = 0;
+  for (const Shares& s : shares_over(scene_named("obstructing_box"), 0.1)) {
+    filled_s = s.moving >= 0.8 ? filled_s + 0.1 : 0.0;
+    longest_s = std::max(longest_s, filled_s);
+  }
+  EXPECT_GE(longest_s, 2.0);
+  EXPECT_LT(longest_s, 4.0);
+}
+
+TEST(Scenes, person_tracking_keeps_the_person_over_20_percent_of_the_view) {
+  for (const Shares& s : shares_over(scene_named("person_tracking"), 0.2)) EXPECT_GT(s.moving, 0.2) << s.t_s;
+}
+
+TEST(Scenes, crowd_close_people_are_0_8_to_1_6_m_away) {
+  const Scene& scene = scene_named("crowd_close");
+  for (double t = 4.6; t < scene.default_seconds; t += 0.2) {
+    const World world = world_at(scene, t, false);
+    std::vector<Shape> movers;
+    for (const Shape& shape : world.shapes)
+      if (shape.moving) movers.push_back(shape);
+    ASSERT_EQ(movers.size() % 3, 0u);
+    const Vec3 lens = cast<float>(scene.camera(t)).translation;
+    for (size_t who = 0; who < 3; ++who) {
+      float nearest = 1e9f;
+      for (size_t i = who * movers.size() / 3; i < (who + 1) * movers.size() / 3; ++i)
+        nearest = std::min(nearest, distance_m(movers[i], lens));
+      EXPECT_GT(nearest, 0.65f) << t;
+      EXPECT_LT(nearest, 1.75f) << t;
+    }
+  }
+}
+
+TEST(Scenes, synchronous_people_stay_where_they_are_in_the_view) {
+  const Scene& scene = scene_named("synchronous");
+  for (double t = 3.6; t < 11.0; t += 0.1) {
+    const World a = world_at(scene, t, false), b = world_at(scene, t + 0.5, false);
+    const Vec3 camera =
+        cast<float>(Se3d{{}, scene.camera(t + 0.5).translation - scene.camera(t).translation}).translation;
+    for (size_t i = 0; i < a.shapes.size(); ++i) {
+      if (!a.shapes[i].moving || a.shapes[i].half_m.x < 0.12f) continue;  // the trunk, not the limbs
+      const Vec3 mover = b.shapes[i].T_world_local.translation - a.shapes[i].T_world_local.translation;
+      EXPECT_LT(std::hypot(mover.x - camera.x, mover.y - camera.y), 0.03f) << t;
+    }
+  }
+}
+
+bool box_moves(const char* name, double t) {
+  return world_at(scene_named(name), t, false).shapes.back().moving;
+}
+
+TEST(Scenes, a_box_is_dynamic_while_it_is_carried_and_static_while_it_rests) {
+  for (const char* name : {"placing_box", "placing_obstructing_box"}) {
+    EXPECT_TRUE(box_moves(name, 0.5)) << name;
+    EXPECT_TRUE(box_moves(name, 4.0)) << name;
+    EXPECT_FALSE(box_moves(name, 9.0)) << name;
+  }
+  for (const char* name : {"removing_box", "kidnapping_box"}) {
+    EXPECT_FALSE(box_moves(name, 0.0)) << name;
+    EXPECT_FALSE(box_moves(name, 3.0)) << name;
+    EXPECT_TRUE(box_moves(name, 6.0)) << name;
+    EXPECT_TRUE(box_moves(name, 12.0)) << name;
+  }
+}
+
+TEST(Scenes, a_resting_box_does_not_move) {
+  for (const char* name : {"placing_box", "placing_obstructing_box", "removing_box", "kidnapping_box"}) {
+    const Scene& scene = scene_named(name);
+    Shape before;
+    bool rested = false;
+    for (double t = 0; t < scene.default_seconds; t += kFrame_s) {
+      const Shape box = world_at(scene, t, false).shapes.back();
+      if (rested && !box.moving) {
+        ASSERT_EQ(norm(box.T_world_local.translation - before.T_world_local.translation), 0.0f)
+            << name << " " << t;
+        for (int i = 0; i < 9; ++i)
+          ASSERT_EQ(box.T_world_local.rotation.m[i], before.T_world_local.rotation.m[i]);
+      }
+      rested = !box.moving;
+      before = box;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace stillmap::synthetic
