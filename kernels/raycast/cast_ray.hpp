@@ -43,7 +43,7 @@ struct RayHit {
 
 namespace ray_detail {
 
-constexpr int32_t kMaxSteps = 1 << 14;
+constexpr int32_t kMaxSteps = 1 << 13;  ///< a step is a voxel or more, or crosses a border of blocks
 constexpr int32_t kMaxRefinements = 12;
 constexpr float kStepShare = 0.8f;          ///< of the distance to the surface
 constexpr float kInterpolateVoxels = 2.0f;  ///< nearer to the surface distances are interpolated

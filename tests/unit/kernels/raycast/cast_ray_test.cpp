@@ -224,7 +224,7 @@ TEST(CastRay, EveryPoseAndEveryCameraEnds) {
   std::uniform_real_distribution<float> near(-0.3f, 0.3f), unit(-1.0f, 1.0f);
   const auto number = [&](auto& usual) { return random() % 4 == 0 ? odd[pick(random)] : usual(random); };
   int hits = 0;
-  for (int i = 0; i < 6000; ++i) {
+  for (int i = 0; i < 3000; ++i) {
     RayBlocks blocks;
     const Ray ray = {{number(near), number(near), number(near)},
                      {number(unit), number(unit), number(unit)},
@@ -235,7 +235,7 @@ TEST(CastRay, EveryPoseAndEveryCameraEnds) {
     ASSERT_TRUE(hit.depth_m == 0.0f || (hit.depth_m > 0.0f && hit.depth_m < ray.far_m));
     hits += hit.depth_m > 0.0f;
   }
-  EXPECT_GT(hits, 50);
+  EXPECT_GT(hits, 20);
   for (const float f : odd) view_of(map, {{}, {0, 0, -1}}, {f, 100, 3.5f, 3.5f, 8, 8});
 }
 
