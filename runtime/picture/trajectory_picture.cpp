@@ -41,7 +41,7 @@ void draw_view(Canvas& canvas, const Rect& outer, std::vector<Point> Path::*view
   if (std::max(x.span(), y.span()) < 0.02) y = {y.low - 0.01, y.high + 0.01};  // a camera that stands still
   Plot::make_equal(outer, x, y);
   Plot plot(canvas, outer, x, y, labels);
-  plot.line(truth.*view, kTruthColour, 3.5);
+  plot.line(truth.*view, kTruthColour, 5);
   plot.line(estimate.*view, kEstimateColour, 1.8);
   plot.dot((estimate.*view).front(), 5, kAccent);
   std::vector<LegendItem> legend;
