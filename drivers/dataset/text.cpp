@@ -8,7 +8,7 @@
 
 #include "config/read_file.hpp"
 
-namespace stillmap {
+namespace stillmap::inline dataset_text {
 namespace {
 
 constexpr uint64_t kMaxTextBytes = 64 << 20;
@@ -127,4 +127,4 @@ std::vector<TextLine> TextFile::lines() const {
   return lines;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::inline dataset_text

@@ -10,7 +10,7 @@
 #include "config/result.hpp"
 #include "runtime/ports/frame_source.hpp"
 
-namespace stillmap {
+namespace stillmap::inline dataset_text {
 
 /// Words of a line, separated by blanks, tabs or commas; none for a comment ('#').
 std::vector<std::string_view> words_of(std::string_view line);
@@ -44,4 +44,4 @@ class TextFile {
   std::string path_, content_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::inline dataset_text
