@@ -19,7 +19,7 @@ constexpr uint64_t kMaxFileBytes = 1 << 20;
 using Complaint = std::string;
 
 Complaint store(double number, float& out) {
-  if (!std::isfinite(number) || std::abs(number) > double{std::numeric_limits<float>::max()})
+  if (!std::isfinite(number) || std::abs(number) > static_cast<double>(std::numeric_limits<float>::max()))
     return "expected a finite number";
   out = static_cast<float>(number);
   return {};
@@ -163,10 +163,11 @@ void read_section(const std::string& file, std::string_view section, const toml:
   for (const auto& [toml_key, node] : table) {
     const std::string_view key = toml_key.str();
     const std::string where = at_line(file, node.source());
-    const bool known = with_field(config, section, key, [&](const Field& field, auto& value) {
-      const Complaint complaint = from_toml(field, node, value);
-      if (!complaint.empty()) problems.push_back(where + field.name() + ": " + complaint);
-    });
+    const bool known =
+        with_field(config, section, key, [&, &value_node = node](const Field& field, auto& value) {
+          const Complaint complaint = from_toml(field, value_node, value);
+          if (!complaint.empty()) problems.push_back(where + field.name() + ": " + complaint);
+        });
     if (!known) problems.push_back(where + unknown_key(section, key));
   }
 }
