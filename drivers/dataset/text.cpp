@@ -93,8 +93,8 @@ std::optional<Stamp> parse_stamp(std::string_view word) {
   };
   int64_t ns = 0;
   for (int64_t i = 0; i < whole_digits; ++i) {
+    if (ns > kMaxNs / 10) return std::nullopt;
     ns = ns * 10 + digit(i);
-    if (ns > kMaxNs) return std::nullopt;
   }
   if (digit(whole_digits) >= 5) ++ns;
   return Stamp{number->negative ? -ns : ns};
