@@ -10,7 +10,7 @@ int main(int argc, char** argv) {
   using namespace stillmap;
   CLI::App app("Tracks an RGB-D camera, throws out whatever moves and maps what stands still.", "stillmap");
   app.set_version_flag("--version", std::string("stillmap ") + version());
-  app.require_subcommand(1);
+  app.require_subcommand(0, 1);
   app.footer("`stillmap SUBCOMMAND --help` explains the flags of each.");
 
   int exit_code = kExitDone;
@@ -30,5 +30,6 @@ int main(int argc, char** argv) {
   } catch (const std::exception& error) {  // what no border caught: memory, a defect
     return fail(error.what(), ErrorKind::failed);
   }
-  return exit_code;
+  if (!app.get_subcommands().empty()) return exit_code;
+  return fail("a subcommand is needed\n" + app.help(), ErrorKind::bad_usage);
 }

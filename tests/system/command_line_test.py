@@ -19,8 +19,9 @@ import tempfile
 import time
 import unittest
 
-PROGRAM, ROOT, VERSION = sys.argv[1:4]
-DATA = pathlib.Path(ROOT).parent / "shared" / "data"
+PROGRAM, ROOT = (pathlib.Path(argument).resolve() for argument in sys.argv[1:3])
+VERSION = sys.argv[3]
+DATA = ROOT.parent / "shared" / "data"
 SMALL = "synthetic:crowd,size=160x120,seconds=1"
 # A coarse map: small in memory and quick, and nothing here depends on its voxels.
 LITTLE = ["--set", "map.pool_blocks=20000", "--set", "map.voxel_m=0.03", "--set", "map.truncation_m=0.12"]
@@ -30,7 +31,12 @@ TIMING = ["stamp", "prepare_ms", "track_ms", "mask_ms", "refine_ms", "integrate_
 
 
 def stillmap(*arguments, timeout=300, **options):
-    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=timeout, **options)
+    return subprocess.run([str(PROGRAM), *map(str, arguments)], capture_output=True, text=True, timeout=timeout, **options)
+
+
+def read_csv(path):
+    with open(path, newline="") as file:
+        return list(csv.reader(file))
 
 
 def read_ply(path):
@@ -142,15 +148,18 @@ class Usage(Case):
         self.refused(2, "run", "--source", SMALL, "--set", "track.levels", says=["track.levels"])
         self.refused(2, "run", "--source", SMALL, "--set", "track.levels=9", "--set", "mask.gamma=2",
                      says=["track.levels", "mask.gamma"])
-        for preset in sorted((pathlib.Path(ROOT) / "config/presets").glob("*.toml")):
-            done = stillmap("check-config", preset)
-            self.assertEqual(done.returncode, 0, done.stderr)
+        for preset in sorted((ROOT / "config/presets").glob("*.toml")):
+            if preset.stem == "paper_tum":  # completion from a temporary model
+                self.refused(2, "check-config", preset, says=["depth.invalid", "build"])
+            else:
+                done = stillmap("check-config", preset)
+                self.assertEqual(done.returncode, 0, done.stderr)
 
     def test_memory_plan(self):
         done = stillmap("memory-plan")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("total", done.stdout)
-        paper = pathlib.Path(ROOT) / "config/presets/paper.toml"
+        paper = ROOT / "config/presets/paper.toml"
         done = stillmap("memory-plan", "--config", paper)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.refused(2, "memory-plan", "--set", "memory.budget_mb=10", says=["memory.budget_mb"])
@@ -239,12 +248,12 @@ class Outputs(Case):
         for pose, true_pose in zip(poses, truth):
             self.assertLess(math.dist(pose[1:4], true_pose[1:4]), 0.1)
 
-        states = list(csv.reader((self.out / "states.csv").open()))
+        states = read_csv(self.out / "states.csv")
         self.assertEqual(states[0][:5], STATES)
         self.assertEqual({len(row) for row in states}, {5 + 21})
         self.assertEqual(len(states), 31)
         self.assertTrue({row[1] for row in states[1:]} <= {"good", "poor", "lost"})
-        timing = list(csv.reader((self.out / "timing.csv").open()))
+        timing = read_csv(self.out / "timing.csv")
         self.assertEqual((timing[0], len(timing)), (TIMING, 31))
 
         vertices, triangles = read_ply(self.out / "mesh.ply")
@@ -354,14 +363,14 @@ class Trouble(Case):
         text = (self.out / "trajectory.txt").read_text()
         self.assertTrue(text.endswith("\n"))
         self.assertGreater(len(read_trajectory(self.out / "trajectory.txt")), 50)
-        rows = list(csv.reader((self.out / "states.csv").open()))
+        rows = read_csv(self.out / "states.csv")
         self.assertEqual({len(row) for row in rows}, {26})
         report = json.loads((self.out / "report.json").read_text())
         self.assertEqual(report["frames"], 180)
         self.assertGreaterEqual(report["faults"]["record_failed"], 3)
 
     def stop(self, number):
-        run = subprocess.Popen([PROGRAM, "run", "--source", "synthetic:crowd,size=160x120,seconds=10000", *LITTLE,
+        run = subprocess.Popen([str(PROGRAM), "run", "--source", "synthetic:crowd,size=160x120,seconds=10000", *LITTLE,
                                 "--out", self.out], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         self.addCleanup(run.kill)
         part = self.out / "trajectory.txt.part"
@@ -385,7 +394,7 @@ class Trouble(Case):
 
     def test_second_interrupt_stops_at_once(self):
         # While it waits for a source it cannot finish anything: the first one ends it with 0.
-        run = subprocess.Popen([PROGRAM, "run", "--source", f"tum:{self.folder}/none", "--set", "source.wait_s=-1"],
+        run = subprocess.Popen([str(PROGRAM), "run", "--source", f"tum:{self.folder}/none", "--set", "source.wait_s=-1"],
                                stderr=subprocess.PIPE)
         self.addCleanup(run.kill)
         time.sleep(0.5)
@@ -402,7 +411,7 @@ class Trouble(Case):
             self.assertIn(word, lines[0])
 
     def test_reader_that_went_away_does_not_end_the_run(self):
-        run = subprocess.Popen([PROGRAM, "run", "--source", SMALL, *LITTLE, "--out", self.out], stdout=subprocess.PIPE)
+        run = subprocess.Popen([str(PROGRAM), "run", "--source", SMALL, *LITTLE, "--out", self.out], stdout=subprocess.PIPE)
         run.stdout.close()
         self.assertEqual(run.wait(timeout=120), 0)
         self.assertEqual(len(read_trajectory(self.out / "trajectory.txt")), 30)
