@@ -12,19 +12,7 @@
 namespace stillmap {
 
 /// Blocks looked up lately. Rays of neighbouring pixels run through the same few dozen blocks.
-struct RayBlocks {
-  static constexpr uint32_t kWays = 512;
-  BlockCache way[kWays];
-
-  STILLMAP_HD BlockCache& way_of(BlockKey key) {
-    return way[static_cast<uint32_t>(key * 0x9e3779b97f4a7c15ull >> 55)];
-  }
-};
-static_assert(RayBlocks::kWays == 1u << (64 - 55));
-
-STILLMAP_HD const VoxelBlock* lookup(const VolumeView& map, BlockKey key, RayBlocks& blocks) {
-  return lookup(map, key, blocks.way_of(key));
-}
+using RayBlocks = RecentBlocks<9>;
 
 /// A ray in the map frame: the point at depth z lies at origin + z direction (direction: camera z is 1).
 struct Ray {
