@@ -58,6 +58,7 @@ struct TrackResult {
   float mapped_ratio = 0;  ///< of the valid unmasked pixels, share that has a value in the map
   float rmse_m = 0;        ///< of the depth residuals of the points used
   int32_t iterations = 0;
+  bool converged = false;  ///< the last step was below track.converged_m and converged_rad
 };
 
 struct MaskResult {

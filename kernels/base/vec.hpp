@@ -11,7 +11,7 @@ namespace stillmap {
 /// Three numbers: a point in metres or a direction; the name of the variable says in which frame.
 template <class T>
 struct Vec3T {
-  T x = 0, y = 0, z = 0;
+  T x{}, y{}, z{};
 };
 
 using Vec3 = Vec3T<float>;

@@ -10,17 +10,14 @@
 
 namespace stillmap {
 
-/// What a frame says about a voxel.
-enum class Seen : int32_t {
-  nothing,  ///< outside the view, no static measurement, or hidden behind the surface
-  free,     ///< in front of the surface by tau or more
-  band      ///< within the truncation band
-};
-
+/// What a frame says about a voxel. At most one is true; neither: the voxel is outside the view, has no
+/// static measurement on its ray, or is hidden behind the surface.
+template <class F>
 struct Observation {
-  Seen seen = Seen::nothing;
-  float sdf_m = 0;    ///< (-tau, tau), of meaning only for `band`
-  int32_t pixel = 0;  ///< index of the pixel in the image; inside it whatever was seen
+  MaskOf<F> free;  ///< in front of the surface by tau or more
+  MaskOf<F> band;  ///< within the truncation band
+  F sdf_m;         ///< (-tau, tau), of meaning only in the band
+  IntOf<F> pixel;  ///< index of the pixel, inside the image whatever was seen
 };
 
 /// The frame, as integration needs it.
@@ -33,74 +30,104 @@ struct FrameGeometry {
   float truncation_m = 0;
 };
 
-/// Projective signed distance along the optical axis: measured depth minus depth of the voxel. Without
-/// branches.
+/// Projective signed distance along the optical axis: measured depth minus depth of the voxel.
 ///                                                                       test: integrate_test
-STILLMAP_HD Observation observe(const FrameGeometry& g, Vec3 p_cam) {
+template <class F>
+STILLMAP_HD Observation<F> observe(const FrameGeometry& g, Vec3T<F> p_cam) {
   const ImageView<const float>& image = g.static_depth_m;
-  const bool in_front = p_cam.z >= g.min_m;
-  const float inv_z = 1.0f / (in_front ? p_cam.z : 1.0f);
-  const float u = g.k.fx * p_cam.x * inv_z + g.k.cx, v = g.k.fy * p_cam.y * inv_z + g.k.cy;
-  const float last_u = static_cast<float>(image.cols) - 0.5f, last_v = static_cast<float>(image.rows) - 0.5f;
-  const bool inside = in_front & (u > -0.5f) & (v > -0.5f) & (u < last_u) & (v < last_v);
-  const int32_t col = static_cast<int32_t>(inside ? u + 0.5f : 0.0f),
-                row = static_cast<int32_t>(inside ? v + 0.5f : 0.0f);
-  Observation o;
-  o.pixel = row * image.pitch + col;
-  const float z_m = image.data[o.pixel];
+  const F zero = F(0.0f), half = F(0.5f);
+  const MaskOf<F> in_front = p_cam.z >= F(g.min_m);
+  const F inv_z = F(1.0f) / select(in_front, p_cam.z, F(1.0f));
+  // Shifted by half a pixel: truncation is then rounding.
+  const F u = F(g.k.fx) * p_cam.x * inv_z + F(g.k.cx) + half,
+          v = F(g.k.fy) * p_cam.y * inv_z + F(g.k.cy) + half;
+  const MaskOf<F> inside = in_front & (u > zero) & (v > zero) & (u < F(static_cast<float>(image.cols))) &
+                           (v < F(static_cast<float>(image.rows)));
+  const IntOf<F> col = to_int(select(inside, u, zero)), row = to_int(select(inside, v, zero));
+  Observation<F> o;
+  o.pixel = row * IntOf<F>(image.pitch) + col;
+  const F z_m = gather_float(image.data, o.pixel);
   o.sdf_m = z_m - p_cam.z;
-  const bool measured = inside & (z_m > 0.0f);
-  const bool free = measured & (o.sdf_m >= g.truncation_m) & (p_cam.z <= g.free_max_m);
-  const bool band = measured & (o.sdf_m < g.truncation_m) & (o.sdf_m > -g.truncation_m) & (z_m <= g.max_m);
-  o.seen = band ? Seen::band : free ? Seen::free : Seen::nothing;
+  const MaskOf<F> measured = inside & (z_m > zero), beyond = o.sdf_m >= F(g.truncation_m);
+  o.free = measured & beyond & (p_cam.z <= F(g.free_max_m));
+  o.band = measured & !beyond & (o.sdf_m > F(-g.truncation_m)) & (z_m <= F(g.max_m));
   return o;
 }
 
-/// A number in [0, 1) from voxel and frame: rounds chroma up or down with the right probability, so that
-/// eight bits do not bias the running mean.
-STILLMAP_HD float dither(uint32_t voxel, uint32_t frame) {
-  uint32_t h = voxel * 0x9e3779b1u ^ (frame + 1u) * 0x85ebca77u;
-  h ^= h >> 15;
-  h *= 0x2c1b3c6du;
-  h ^= h >> 13;
-  return static_cast<float>(static_cast<int32_t>(h >> 8)) * (1.0f / 16777216.0f);
-}
+/// Positions of the voxels of one block in the camera frame, metres.
+struct VoxelGrid {
+  Vec3 origin, dx, dy, dz;
+
+  STILLMAP_HD VoxelGrid(const Se3& T_cam_map, Int3 block, float voxel_m)
+      : origin(T_cam_map * voxel_position(first_voxel(block), voxel_m)),
+        dx(voxel_m * column(T_cam_map, 0)),
+        dy(voxel_m * column(T_cam_map, 1)),
+        dz(voxel_m * column(T_cam_map, 2)) {}
+
+  template <class F>
+  STILLMAP_HD Vec3T<F> position(F x, int32_t y, int32_t z) const {
+    const Vec3 row = origin + static_cast<float>(y) * dy + static_cast<float>(z) * dz;
+    return {F(row.x) + F(dx.x) * x, F(row.y) + F(dx.y) * x, F(row.z) + F(dx.z) * x};
+  }
+
+ private:
+  STILLMAP_HD static Vec3 column(const Se3& T, int32_t c) {
+    return {T.rotation(0, c), T.rotation(1, c), T.rotation(2, c)};
+  }
+};
+
+/// One voxel taken apart; all numbers whole.
+template <class F>
+struct VoxelState {
+  F sdf, luma, weight, colour_weight, cb, cr;
+};
 
 /// Numbers of one fusion that are the same for all voxels.
 struct FuseWeights {
   float units_per_m = 0;  ///< of VoxelSurface::sdf
-  int32_t weight_cap = 64;
+  float weight_cap = 64;
 };
 
-/// Weighted running means of distance and colour for one voxel (paper III-A), and carving (III-D): in free
-/// space the observation is tau. Without branches, so that a loop over voxels becomes vector code. test:
-/// integrate_test
+/// Weighted running means of distance and colour of a voxel (paper III-A), and carving (III-D): in free space
+/// the observation is tau.                                                     test: integrate_test
 ///
 /// Distance and luminance are rounded to the nearest of 16 bits, chroma up or down by `dither01`: no bias. A
 /// voxel seen free moves by at least one unit, so that what is seen free long enough becomes exactly free.
-STILLMAP_HD void fuse_voxel(VoxelSurface& surface, VoxelRecord& record, Seen seen, float sdf_m,
-                            LumaChroma colour, const FuseWeights& p, float dither01) {
-  const bool band = seen == Seen::band, any = seen != Seen::nothing;
-  const int32_t w = record.weight, wc = record.colour_weight;
-  const float old = w == 0 ? 0.0f : static_cast<float>(surface.sdf);
-  const float observed = band ? sdf_m * p.units_per_m : static_cast<float>(kSdfMax);
-  const float mean = rintf(old + (observed - old) / static_cast<float>(w + 1));
-  const float freer = fminf(fmaxf(mean, old + 1.0f), static_cast<float>(kSdfMax));
-  const float sdf = band ? mean : freer;
-  const float share = 1.0f / static_cast<float>(wc + 1);
-  const float y = static_cast<float>(surface.luma), cb = static_cast<float>(record.cb),
-              cr = static_cast<float>(record.cr);
-  const float new_y = y + (static_cast<float>(colour.luma) - y) * share + 0.5f;
-  const float new_cb = fminf(cb + (static_cast<float>(colour.cb) - cb) * share + dither01, 255.0f);
-  const float new_cr = fminf(cr + (static_cast<float>(colour.cr) - cr) * share + dither01, 255.0f);
-  const int32_t next_w = w < p.weight_cap ? w + 1 : w, next_wc = wc < p.weight_cap ? wc + 1 : wc;
-  surface.sdf = static_cast<int16_t>(any ? static_cast<int32_t>(sdf) : static_cast<int32_t>(surface.sdf));
-  surface.luma =
-      static_cast<uint16_t>(band ? static_cast<int32_t>(new_y) : static_cast<int32_t>(surface.luma));
-  record.weight = static_cast<uint8_t>(any ? next_w : w);
-  record.colour_weight = static_cast<uint8_t>(band ? next_wc : wc);
-  record.cb = static_cast<uint8_t>(band ? static_cast<int32_t>(new_cb) : static_cast<int32_t>(record.cb));
-  record.cr = static_cast<uint8_t>(band ? static_cast<int32_t>(new_cr) : static_cast<int32_t>(record.cr));
+/// @param colour in the units of the voxel
+template <class F>
+STILLMAP_HD VoxelState<F> fused(VoxelState<F> v, const Observation<F>& o, F luma, F cb, F cr,
+                                const FuseWeights& p, F dither01) {
+  const F one = F(1.0f), cap = F(p.weight_cap), tau = F(static_cast<float>(kSdfMax));
+  const MaskOf<F> any = o.free | o.band;
+  const F old = select(v.weight > F(0.0f), v.sdf, F(0.0f));
+  const F observed = select(o.band, o.sdf_m * F(p.units_per_m), tau);
+  const F mean = round_nearest(old + (observed - old) / (v.weight + one));
+  const F sdf = select(o.band, mean, min_of(max_of(mean, old + one), tau));
+  const F share = one / (v.colour_weight + one);
+  const auto mixed = [&](F from, F to, F rounding) {
+    return to_float(to_int(from + (to - from) * share + rounding));
+  };
+  VoxelState<F> out;
+  out.sdf = select(any, sdf, v.sdf);
+  out.weight = select(any, min_of(v.weight + one, cap), v.weight);
+  out.luma = select(o.band, mixed(v.luma, luma, F(0.5f)), v.luma);
+  out.cb = select(o.band, mixed(v.cb, cb, dither01), v.cb);
+  out.cr = select(o.band, mixed(v.cr, cr, dither01), v.cr);
+  out.colour_weight = select(o.band, min_of(v.colour_weight + one, cap), v.colour_weight);
+  return out;
+}
+
+/// A number in [0, 1) from voxel and frame: rounds chroma up or down with the right probability, so that
+/// eight bits do not bias the running mean.
+template <class I>
+STILLMAP_HD I dither_bits(I voxel, I frame) {
+  I h = (voxel + frame * I(0x3504f333)) * I(0x2c1b3c6d);
+  h = (h ^ shift_right(h, 15)) * I(0x297a2d39);
+  return shift_right(h ^ shift_right(h, 15), 8) & I(0xffff);
+}
+template <class F>
+STILLMAP_HD F dither(IntOf<F> voxel, int32_t frame) {
+  return to_float(dither_bits(voxel, IntOf<F>(frame))) * F(1.0f / 65536.0f);
 }
 
 }  // namespace stillmap

@@ -16,6 +16,8 @@ struct VisibleBlock {
 };
 
 /// Fuses one frame into one visible block: distance, colour, free space and carving (paper III-A, III-D).
+///
+/// `Voxels` reads and writes what F holds: one voxel (PlainVoxels below), or a row of them (backend/cpu).
 struct IntegratePass {
   VolumeView map;
   FrameGeometry geometry;
@@ -23,67 +25,66 @@ struct IntegratePass {
   Se3 T_cam_map;
   FuseWeights weights;
   bool free_space;  ///< false: a voxel that was never in the band stays unobserved
-  uint32_t frame;   ///< counts frames, for the dither
+  int32_t frame;    ///< counts frames, for the dither
 
-  STILLMAP_HD void operator()(VisibleBlock visible) const {
-    if (!visible.all_free())
-      fuse_mixed_block(visible.id());
-    else if (!map.settled_free[visible.id()])
-      fuse_free_block(visible.id());
-  }
-
- private:
-  STILLMAP_HD void fuse_free_block(BlockId id) const {
+  template <class Voxels>
+  STILLMAP_HD void operator()(VisibleBlock visible, const Voxels& voxels) const {
+    using F = typename Voxels::Number;
+    const BlockId id = visible.id();
+    if (visible.all_free() && map.settled_free[id]) return;
     VoxelBlock& block = map.blocks[id];
-    bool settled = true;
-    for (int32_t i = 0; i < kBlockVoxels; ++i) {
-      const Seen seen = free_space || block.record[i].weight > 0 ? Seen::free : Seen::nothing;
-      fuse_voxel(block.surface[i], block.record[i], seen, 0.0f, {}, weights, 0.0f);
-      settled &= (block.surface[i].sdf == kSdfMax) & (block.record[i].weight >= weights.weight_cap);
-    }
-    map.settled_free[id] = settled;
-  }
-
-  STILLMAP_HD void fuse_mixed_block(BlockId id) const {
-    VoxelBlock& block = map.blocks[id];
-    const Int3 first = first_voxel(unpack(map.block_keys[id]));
-    const Vec3 origin_cam = T_cam_map * voxel_position(first, map.voxel_m);
-    const Mat3& r = T_cam_map.rotation;
-    const Vec3 dx = map.voxel_m * Vec3{r(0, 0), r(1, 0), r(2, 0)},
-               dy = map.voxel_m * Vec3{r(0, 1), r(1, 1), r(2, 1)},
-               dz = map.voxel_m * Vec3{r(0, 2), r(1, 2), r(2, 2)};
-    int32_t touched_band = 0;
+    const VoxelGrid grid(T_cam_map, unpack(map.block_keys[id]), map.voxel_m);
+    bool settled = visible.all_free(), touched_band = false;
     for (int32_t z = 0; z < kBlockEdge; ++z)
-      for (int32_t y = 0; y < kBlockEdge; ++y) {
-        const Vec3 row_cam = origin_cam + static_cast<float>(y) * dy + static_cast<float>(z) * dz;
-        touched_band |= fuse_row(block, voxel_index(0, y, z), row_cam, dx, id);
-      }
-    if (touched_band) map.settled_free[id] = 0;
+      for (int32_t y = 0; y < kBlockEdge; ++y)
+        for (int32_t x = 0; x < kBlockEdge; x += Voxels::kCount) {
+          Observation<F> o = {voxels.all(), !voxels.all(), F(0.0f), IntOf<F>(0)};
+          if (!visible.all_free()) o = observe(geometry, grid.position<F>(voxels.ramp(x), y, z));
+          if (!voxels.any(o.free | o.band)) continue;
+          const int32_t i = voxel_index(x, y, z);
+          VoxelState<F> state = voxels.load(block, i);
+          if (!free_space) o.free = o.free & (state.weight > F(0.0f));
+          const IntOf<F> voxel = voxels.index(i) + IntOf<F>(static_cast<int32_t>(id) * kBlockVoxels);
+          F luma = F(0.0f), cb = F(0.0f), cr = F(0.0f);
+          const bool band = voxels.any(o.band);
+          if (band) voxels.load_colour(colour, o.pixel, luma, cb, cr);
+          state = fused(state, o, luma, cb, cr, weights, band ? dither<F>(voxel, frame) : F(0.0f));
+          voxels.store(block, i, state);
+          settled = settled && !voxels.any((state.sdf < F(static_cast<float>(kSdfMax))) |
+                                           (state.weight < F(weights.weight_cap)));
+          touched_band |= band;
+        }
+    if (visible.all_free())
+      map.settled_free[id] = settled;
+    else if (touched_band)
+      map.settled_free[id] = 0;
   }
+};
 
-  /// Eight voxels along x: first what the frame says of them, then, unless it says nothing, the update.
-  STILLMAP_HD int32_t fuse_row(VoxelBlock& block, int32_t first, Vec3 row_cam, Vec3 dx, BlockId id) const {
-    Seen seen[kBlockEdge];
-    float sdf_m[kBlockEdge];
-    int32_t pixel[kBlockEdge];
-    int32_t any = 0, band = 0;
-    for (int32_t x = 0; x < kBlockEdge; ++x) {
-      const Observation o = observe(geometry, row_cam + static_cast<float>(x) * dx);
-      const bool keep = (o.seen == Seen::band) |
-                        ((o.seen == Seen::free) & (free_space | (block.record[first + x].weight > 0)));
-      seen[x] = keep ? o.seen : Seen::nothing;
-      sdf_m[x] = o.sdf_m;
-      pixel[x] = o.pixel;
-      any |= static_cast<int32_t>(seen[x]);
-      band |= static_cast<int32_t>(o.seen == Seen::band);
-    }
-    if (any == 0) return 0;
-    for (int32_t x = 0; x < kBlockEdge; ++x) {
-      const int32_t i = first + x;
-      fuse_voxel(block.surface[i], block.record[i], seen[x], sdf_m[x], colour[pixel[x]], weights,
-                 dither(static_cast<uint32_t>(i) + id * kBlockVoxels, frame));
-    }
-    return band;
+/// Voxels one at a time.
+struct PlainVoxels {
+  using Number = float;
+  static constexpr int32_t kCount = 1;
+
+  STILLMAP_HD bool all() const { return true; }
+  STILLMAP_HD bool any(bool which) const { return which; }
+  STILLMAP_HD float ramp(int32_t x) const { return static_cast<float>(x); }
+  STILLMAP_HD int32_t index(int32_t i) const { return i; }
+  STILLMAP_HD VoxelState<float> load(const VoxelBlock& block, int32_t i) const {
+    const VoxelSurface s = block.surface[i];
+    const VoxelRecord r = block.record[i];
+    return {static_cast<float>(s.sdf),           static_cast<float>(s.luma), static_cast<float>(r.weight),
+            static_cast<float>(r.colour_weight), static_cast<float>(r.cb),   static_cast<float>(r.cr)};
+  }
+  STILLMAP_HD void store(VoxelBlock& block, int32_t i, const VoxelState<float>& v) const {
+    block.surface[i] = {static_cast<int16_t>(v.sdf), static_cast<uint16_t>(v.luma)};
+    block.record[i] = {static_cast<uint8_t>(v.weight), static_cast<uint8_t>(v.colour_weight),
+                       static_cast<uint8_t>(v.cb), static_cast<uint8_t>(v.cr)};
+  }
+  STILLMAP_HD void load_colour(const LumaChroma* image, int32_t pixel, float& luma, float& cb,
+                               float& cr) const {
+    const LumaChroma c = image[pixel];
+    luma = static_cast<float>(c.luma), cb = static_cast<float>(c.cb), cr = static_cast<float>(c.cr);
   }
 };
 

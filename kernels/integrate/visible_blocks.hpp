@@ -85,7 +85,9 @@ struct VisibleGroupPass {
     return {g.x * kGroupEdge + (bit & 3), g.y * kGroupEdge + (bit >> 2 & 3), g.z * kGroupEdge + (bit >> 4)};
   }
 
-  STILLMAP_HD GroupView operator()(uint32_t group_index) const {
+  /// @param voxels how voxels are taken: PlainVoxels, or a row of them (backend/cpu)
+  template <class Voxels>
+  STILLMAP_HD GroupView operator()(uint32_t group_index, const Voxels& voxels) const {
     GroupView view;
     const CubeGeometry group = cube_geometry(kGroupEdge * kBlockEdge, map.voxel_m);
     const CubeGeometry block = cube_geometry(kBlockEdge, map.voxel_m);
@@ -97,7 +99,7 @@ struct VisibleGroupPass {
       if (seen == BlockView::free && (free_space || map.table.find(pack(b)) != kNoBlock)) view.free |= flag;
       // A block that is not in the map yet is made only when the frame has something to say about one of its
       // voxels.
-      if (seen == BlockView::mixed && (map.table.find(pack(b)) != kNoBlock || concerns(b)))
+      if (seen == BlockView::mixed && (map.table.find(pack(b)) != kNoBlock || concerns(b, voxels)))
         view.mixed |= flag;
     }
     return view;
@@ -108,14 +110,15 @@ struct VisibleGroupPass {
     const Vec3 p_map = voxel_position(first_voxel(block), map.voxel_m) + cube.centre_offset_m;
     return classify(geometry, ranges, T_cam_map * p_map, cube.radius_m);
   }
-  STILLMAP_HD bool concerns(Int3 block) const {
-    const Int3 first = first_voxel(block);
+  template <class Voxels>
+  STILLMAP_HD bool concerns(Int3 block, const Voxels& voxels) const {
+    using F = typename Voxels::Number;
+    const VoxelGrid grid(T_cam_map, block, map.voxel_m);
     for (int32_t z = 0; z < kBlockEdge; ++z)
       for (int32_t y = 0; y < kBlockEdge; ++y)
-        for (int32_t x = 0; x < kBlockEdge; ++x) {
-          const Seen seen =
-              observe(geometry, T_cam_map * voxel_position(first + Int3{x, y, z}, map.voxel_m)).seen;
-          if (seen == Seen::band || (seen == Seen::free && free_space)) return true;
+        for (int32_t x = 0; x < kBlockEdge; x += Voxels::kCount) {
+          const Observation<F> o = observe(geometry, grid.position<F>(voxels.ramp(x), y, z));
+          if (voxels.any(free_space ? o.band | o.free : o.band)) return true;
         }
     return false;
   }

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include "kernels/base/lane.hpp"
 #include "kernels/map/hash_view.hpp"
 #include "kernels/map/voxel.hpp"
 
@@ -36,18 +37,25 @@ STILLMAP_HD const VoxelBlock* lookup(const VolumeView& map, BlockKey key, BlockC
   return cache.block;
 }
 
-/// Reads the eight voxels around a point, x fastest: 000 100 010 110 001 101 011 111.            test:
+/// Blocks looked up lately, a place a key: on the CPU the eight voxels around a point, and neighbouring rays,
+/// go back and forth between a few blocks.
+template <int kBits>
+struct RecentBlocks {
+  BlockCache place[1 << kBits];
+};
+template <int kBits>
+STILLMAP_HD const VoxelBlock* lookup(const VolumeView& map, BlockKey key, RecentBlocks<kBits>& recent) {
+  return lookup(map, key, recent.place[key * 0x9e3779b97f4a7c15ull >> (64 - kBits)]);
+}
+
+/// Reads a voxel and its seven neighbours towards +x, +y, +z: 000 100 010 110 001 101 011 111.    test:
 /// volume_test
-/// @param grid position in voxels (p_map / voxel_m)
-/// @param fraction where the point lies between them, 0..1 along each axis
-/// @return false when one of them was never observed; the outputs are then of no meaning
-STILLMAP_HD bool read_corners(const VolumeView& map, Vec3 grid, BlockCache& cache, VoxelSurface voxel[8],
-                              Vec3& fraction) {
-  const float fx = floorf(grid.x), fy = floorf(grid.y), fz = floorf(grid.z);
-  fraction = {grid.x - fx, grid.y - fy, grid.z - fz};
-  const Int3 base = {static_cast<int32_t>(fx), static_cast<int32_t>(fy), static_cast<int32_t>(fz)};
+/// @return false when one of them was never observed; `voxel` is then of no meaning
+/// @param cache BlockCache or RecentBlocks
+template <class Cache>
+STILLMAP_HD bool read_corners(const VolumeView& map, Int3 base, Cache& cache, VoxelSurface voxel[8]) {
   const Int3 local = {base.x & 7, base.y & 7, base.z & 7};
-  if (local.x < 7 && local.y < 7 && local.z < 7) {
+  if ((local.x < 7) & (local.y < 7) & (local.z < 7)) {
     const VoxelBlock* block = lookup(map, pack(block_of_voxel(base)), cache);
     if (!block) return false;
     const VoxelSurface* v = block->surface + voxel_index(local.x, local.y, local.z);
@@ -67,35 +75,57 @@ STILLMAP_HD bool read_corners(const VolumeView& map, Vec3 grid, BlockCache& cach
   return observed;
 }
 
-/// Trilinear mean of eight corner values.
-STILLMAP_HD float trilinear(const float c[8], Vec3 f) {
-  const float x00 = c[0] + f.x * (c[1] - c[0]), x10 = c[2] + f.x * (c[3] - c[2]);
-  const float x01 = c[4] + f.x * (c[5] - c[4]), x11 = c[6] + f.x * (c[7] - c[6]);
-  const float y0 = x00 + f.y * (x10 - x00), y1 = x01 + f.y * (x11 - x01);
+/// Trilinear mean of eight corner values.                                 test: volume_test
+/// @param f where the point lies between them, 0..1 along each axis
+template <class F>
+STILLMAP_HD F trilinear(const F c[8], Vec3T<F> f) {
+  const F x00 = c[0] + f.x * (c[1] - c[0]), x10 = c[2] + f.x * (c[3] - c[2]);
+  const F x01 = c[4] + f.x * (c[5] - c[4]), x11 = c[6] + f.x * (c[7] - c[6]);
+  const F y0 = x00 + f.y * (x10 - x00), y1 = x01 + f.y * (x11 - x01);
   return y0 + f.z * (y1 - y0);
 }
 
-/// Its gradient by the three fractions (analytic, of the same eight values).   test: volume_test
-STILLMAP_HD Vec3 trilinear_gradient(const float c[8], Vec3 f) {
-  const float dx00 = c[1] - c[0], dx10 = c[3] - c[2], dx01 = c[5] - c[4], dx11 = c[7] - c[6];
-  const float dx0 = dx00 + f.y * (dx10 - dx00), dx1 = dx01 + f.y * (dx11 - dx01);
-  const float x00 = c[0] + f.x * dx00, x10 = c[2] + f.x * dx10, x01 = c[4] + f.x * dx01,
-              x11 = c[6] + f.x * dx11;
-  const float dy0 = x10 - x00, dy1 = x11 - x01;
-  const float y0 = x00 + f.y * dy0, y1 = x01 + f.y * dy1;
-  return {dx0 + f.z * (dx1 - dx0), dy0 + f.z * (dy1 - dy0), y1 - y0};
+/// The same with its gradient by `f` (analytic).                          test: volume_test
+template <class F>
+STILLMAP_HD F trilinear(const F c[8], Vec3T<F> f, Vec3T<F>& gradient) {
+  const F dx00 = c[1] - c[0], dx10 = c[3] - c[2], dx01 = c[5] - c[4], dx11 = c[7] - c[6];
+  const F dx0 = dx00 + f.y * (dx10 - dx00), dx1 = dx01 + f.y * (dx11 - dx01);
+  const F x00 = c[0] + f.x * dx00, x10 = c[2] + f.x * dx10, x01 = c[4] + f.x * dx01, x11 = c[6] + f.x * dx11;
+  const F dy0 = x10 - x00, dy1 = x11 - x01;
+  const F y0 = x00 + f.y * dy0, y1 = x01 + f.y * dy1;
+  gradient = {dx0 + f.z * (dx1 - dx0), dy0 + f.z * (dy1 - dy0), y1 - y0};
+  return y0 + f.z * (y1 - y0);
+}
+
+/// The voxel at or below a point, and where the point lies from there, 0..1 along each axis.
+/// @param grid position in voxels (p_map / voxel_m)
+template <class F>
+struct GridCell {
+  IntOf<F> x, y, z;
+  Vec3T<F> fraction;
+};
+template <class F>
+STILLMAP_HD GridCell<F> cell_of(Vec3T<F> grid) {
+  GridCell<F> c{floor_int(grid.x), floor_int(grid.y), floor_int(grid.z), {}};
+  c.fraction = {grid.x - to_float(c.x), grid.y - to_float(c.y), grid.z - to_float(c.z)};
+  return c;
 }
 
 /// V_SDF at a point, metres (paper section III-B).                        test: volume_test
 /// @return false when a neighbouring voxel is unobserved
-STILLMAP_HD bool sample_sdf(const VolumeView& map, Vec3 p_map, BlockCache& cache, float& sdf_m) {
+template <class Cache>
+STILLMAP_HD bool sample_sdf(const VolumeView& map, const GridCell<float>& cell, Cache& cache, float& sdf_m) {
   VoxelSurface voxel[8];
-  Vec3 fraction;
-  if (!read_corners(map, (1.0f / map.voxel_m) * p_map, cache, voxel, fraction)) return false;
+  if (!read_corners(map, {cell.x, cell.y, cell.z}, cache, voxel)) return false;
   float sdf[8];
   for (int32_t i = 0; i < 8; ++i) sdf[i] = static_cast<float>(voxel[i].sdf);
-  sdf_m = trilinear(sdf, fraction) * map.sdf_unit_m();
+  sdf_m = trilinear(sdf, cell.fraction) * map.sdf_unit_m();
   return true;
+}
+/// @param p_map metres
+template <class Cache>
+STILLMAP_HD bool sample_sdf(const VolumeView& map, Vec3 p_map, Cache& cache, float& sdf_m) {
+  return sample_sdf(map, cell_of((1.0f / map.voxel_m) * p_map), cache, sdf_m);
 }
 
 }  // namespace stillmap

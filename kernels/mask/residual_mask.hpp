@@ -21,14 +21,18 @@ struct ResidualMaskPass {
   float max_m = 0;
   float threshold_m2 = 0;  ///< gamma tau^2
 
-  STILLMAP_HD void operator()(int32_t row, int32_t col, BlockCache& cache) const {
+  template <class Cache>
+  STILLMAP_HD void operator()(int32_t row, int32_t col, Cache& cache) const {
     const float z_m = depth_m.at(row, col);
     float sdf_m = 0;
     const bool measured =
-        z_m > 0.0f && z_m <= max_m &&
-        sample_sdf(map, T_map_cam * unproject(k, static_cast<float>(col), static_cast<float>(row), z_m),
-                   cache, sdf_m);
+        z_m > 0.0f && z_m <= max_m && sample_sdf(map, point_map(row, col, z_m), cache, sdf_m);
     suspect.at(row, col) = measured && sdf_m * sdf_m > threshold_m2 ? kMasked : uint8_t{0};
+  }
+
+ private:
+  STILLMAP_HD Vec3 point_map(int32_t row, int32_t col, float z_m) const {
+    return T_map_cam * unproject(k, static_cast<float>(col), static_cast<float>(row), z_m);
   }
 };
 

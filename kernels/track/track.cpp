@@ -39,6 +39,7 @@ struct State {
   Se3 T_map_cam;
   NormalEq sums;
   double damping;
+  bool converged;  ///< the last step was small
 };
 
 /// One level: at most `iterations` steps, accepted or rejected.
@@ -57,9 +58,9 @@ int32_t run_level(const PassRunner& pass, int32_t step_px, int32_t iterations, c
       state.T_map_cam = step.T_map_cam;
       state.sums = candidate;
     }
-    if (step.translation_m < static_cast<double>(p.converged_m) &&
-        step.rotation_rad < static_cast<double>(p.converged_rad))
-      break;
+    state.converged = step.translation_m < static_cast<double>(p.converged_m) &&
+                      step.rotation_rad < static_cast<double>(p.converged_rad);
+    if (state.converged) break;
   }
   return i;
 }
@@ -98,7 +99,7 @@ TrackResult register_frame(const PassRunner& pass, const Se3& T_start, const Tra
   const int32_t iterations[3] = {params.iterations_fine, params.iterations_middle, params.iterations_coarse};
   TrackResult result;
   result.T_world_cam = T_start;
-  State state{T_start, {}, static_cast<double>(params.damping_initial)};
+  State state{T_start, {}, static_cast<double>(params.damping_initial), false};
   for (int32_t level = params.levels - 1; level >= 0; --level)
     result.iterations += run_level(pass, 1 << level, iterations[level], params, state);
 
@@ -115,6 +116,7 @@ TrackResult register_frame(const PassRunner& pass, const Se3& T_start, const Tra
     return result;
   }
   result.T_world_cam = state.T_map_cam;
+  result.converged = state.converged;
   write_covariance(sums, state.T_map_cam.translation, result.covariance);
   return result;
 }

@@ -8,11 +8,12 @@
 
 namespace stillmap {
 
-/// A row pixel on its way into the map.
+/// A pixel on its way into the map.
+template <class F>
 struct PixelPoint {
-  Vec3 arm;             ///< camera centre to point, metres, map axes
-  Vec3 grid;            ///< position in voxels, map frame
-  bool usable = false;  ///< measured, in range, not masked
+  Vec3T<F> arm;        ///< camera centre to point, metres, map axes
+  GridCell<F> cell;    ///< of the map
+  MaskOf<F> in_range;  ///< measured, not too far
 };
 
 /// One pass of E_d + w_c E_c (paper Eq. (4)) over an image.
@@ -30,34 +31,45 @@ struct TrackPass {
   float max_m = 0;
   TrackWeights weights;
 
-  STILLMAP_HD PixelPoint point_of(int32_t row, int32_t col) const {
-    PixelPoint p;
-    const float z_m = depth_m.at(row, col);
-    const bool masked = use_mask & (mask.at(row, col) != 0);
-    p.usable = (z_m > 0.0f) & (z_m <= max_m) & !masked;
-    p.arm = T_map_cam.rotation * unproject(k, static_cast<float>(col), static_cast<float>(row), z_m);
-    p.grid = weights.inv_voxel_m * (p.arm + T_map_cam.translation);
+  /// Eq. (1), the pose, and the cell of the map.
+  template <class F>
+  STILLMAP_HD PixelPoint<F> point_of(F row, F col, F z_m) const {
+    PixelPoint<F> p;
+    p.in_range = (z_m > F(0.0f)) & (z_m <= F(max_m));
+    const F safe_z_m = select(p.in_range, z_m, F(0.0f));
+    const Vec3T<F> p_cam = {(col - F(k.cx)) * F(1.0f / k.fx) * safe_z_m,
+                            (row - F(k.cy)) * F(1.0f / k.fy) * safe_z_m, safe_z_m};
+    const Mat3& r = T_map_cam.rotation;
+    p.arm = {F(r.m[0]) * p_cam.x + F(r.m[1]) * p_cam.y + F(r.m[2]) * p_cam.z,
+             F(r.m[3]) * p_cam.x + F(r.m[4]) * p_cam.y + F(r.m[5]) * p_cam.z,
+             F(r.m[6]) * p_cam.x + F(r.m[7]) * p_cam.y + F(r.m[8]) * p_cam.z};
+    const Vec3 t = T_map_cam.translation;
+    p.cell = cell_of(F(weights.inv_voxel_m) * (p.arm + Vec3T<F>{F(t.x), F(t.y), F(t.z)}));
     return p;
   }
 
-  /// Fetches the voxels around a usable point.
-  /// @return false when one was never observed
-  STILLMAP_HD bool fetch(const PixelPoint& p, int32_t row, int32_t col, BlockCache& cache,
-                         TrackPoint& out) const {
-    if (!read_corners(map, p.grid, cache, out.voxel, out.fraction)) return false;
-    out.arm = p.arm;
-    out.luma = static_cast<float>(colour.at(row, col).luma) * (1.0f / kLumaScale);
-    return true;
-  }
+  STILLMAP_HD bool masked(int32_t row, int32_t col) const { return use_mask && mask.at(row, col) != 0; }
 
   /// All of it for one pixel; the plain form that the vector loops of the CPU are checked against.
-  STILLMAP_HD void operator()(int32_t row, int32_t col, BlockCache& cache, NormalEqT<float>& sums) const {
-    const PixelPoint p = point_of(row, col);
-    if (!p.usable) return;
+  template <class Cache>
+  STILLMAP_HD void operator()(int32_t row, int32_t col, Cache& cache, NormalEqT<float>& sums) const {
+    const PixelPoint<float> p =
+        point_of(static_cast<float>(row), static_cast<float>(col), depth_m.at(row, col));
+    if (!p.in_range || masked(row, col)) return;
     sums.sum[kConsidered] += 1.0f;
-    TrackPoint point;
-    if (fetch(p, row, col, cache, point))
-      add_point(point_terms(point, weights), point.arm, 1.0f, sums.sum, 1);
+    VoxelSurface voxel[8];
+    if (!read_corners(map, {p.cell.x, p.cell.y, p.cell.z}, cache, voxel)) return;
+    TrackPoint<float> point;
+    point.surface = true;
+    for (int32_t i = 0; i < 8; ++i) {
+      point.sdf[i] = static_cast<float>(voxel[i].sdf);
+      point.luma[i] = static_cast<float>(voxel[i].luma);
+      point.surface &= voxel[i].sdf != kSdfMax;
+    }
+    point.fraction = p.cell.fraction;
+    point.arm = p.arm;
+    point.measured_luma = static_cast<float>(colour.at(row, col).luma);
+    add_point(point_terms(point, weights), point.arm, 1.0f, sums.sum);
   }
 };
 

@@ -90,8 +90,10 @@ FrameResult Pipeline::track_and_map(FrameResult result) {
   result.ms.track_ms = watch.lap_ms();
   const MaskResult mask = engine_.mask(initial.T_world_cam);
   result.ms.mask_ms = watch.lap_ms();
-  // With nothing masked the second registration would solve the first one's problem again.
-  const TrackResult refined = mask.masked_valid_pixels > 0 ? engine_.refine(initial.T_world_cam) : initial;
+  // With nothing masked the second registration is the first one gone on with; nothing is left when it has
+  // converged.
+  const bool go_on = mask.masked_valid_pixels > 0 || !initial.converged;
+  const TrackResult refined = go_on ? engine_.refine(initial.T_world_cam) : initial;
   result.ms.refine_ms = watch.lap_ms();
 
   const int32_t pixels = engine_.mask_image().pixels();

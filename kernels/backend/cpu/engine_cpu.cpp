@@ -87,8 +87,8 @@ struct CpuMemory {
     valid_tiles = arena.take<int32_t>("sums of tiles", tiles);
     groups = arena.take<GroupView>("visible blocks", max_groups(p));
     visible = arena.take<VisibleBlock>("visible blocks", static_cast<uint64_t>(p.map.pool_blocks));
-    extract_scratch =
-        arena.take<uint8_t>("mesh and views", extract_scratch_bytes(static_cast<uint32_t>(p.map.pool_blocks)));
+    extract_scratch = arena.take<uint8_t>("mesh and views",
+                                          extract_scratch_bytes(static_cast<uint32_t>(p.map.pool_blocks)));
     raycast_scratch = arena.take<uint8_t>("mesh and views", raycast_scratch_bytes());
     map.carve(arena, p.map);
   }
@@ -130,7 +130,8 @@ class CpuEngine final : public Engine {
   IntegrateResult integrate(const Se3& T_world_cam) override;
   Status raycast(const Se3& T_world_cam, const Intrinsics& k, ImageView<float> depth_m,
                  ImageView<Rgb8> colour) override {
-    return stillmap::raycast({memory_.map.view(), k, T_world_cam, depth_m, colour}, memory_.raycast_scratch, pool_);
+    return stillmap::raycast({memory_.map.view(), k, T_world_cam, depth_m, colour}, memory_.raycast_scratch,
+                             pool_);
   }
   Status extract_mesh(MeshSink& sink) override {
     return stillmap::extract_mesh(memory_.map.view(), sink, memory_.extract_scratch, pool_);
@@ -157,7 +158,7 @@ class CpuEngine final : public Engine {
   CpuMemory memory_;
   const CpuLoops& loops_;
   ThreadPool pool_;
-  uint32_t frames_ = 0;
+  int32_t frames_ = 0;  ///< integrated, modulo 2^16
 };
 
 void CpuEngine::fill_source_pixels() {
@@ -365,14 +366,14 @@ IntegrateResult CpuEngine::integrate(const Se3& T_world_cam) {
   const VisibleGroupPass visible = visible_pass(T_world_cam, geometry);
   const Status listed = list_visible(visible, result.visible_blocks);
   if (listed != Status::ok) result.status = listed;
-  const IntegratePass pass{
-      memory_.map.view(),
-      geometry,
-      memory_.luma_chroma.data,
-      visible.T_cam_map,
-      {static_cast<float>(kSdfMax) / params_.map.truncation_m, params_.integrate.weight_cap},
-      params_.integrate.free_space,
-      frames_++};
+  const IntegratePass pass{memory_.map.view(),
+                           geometry,
+                           memory_.luma_chroma.data,
+                           visible.T_cam_map,
+                           {static_cast<float>(kSdfMax) / params_.map.truncation_m,
+                            static_cast<float>(params_.integrate.weight_cap)},
+                           params_.integrate.free_space,
+                           frames_++};
   const View<const VisibleBlock> blocks{memory_.visible.data, result.visible_blocks};
   pool_.for_each((blocks.size + kBlocksPerTile - 1) / kBlocksPerTile, [&](uint32_t tile) {
     const uint32_t first = tile * kBlocksPerTile;

@@ -1,0 +1,174 @@
+#pragma once
+
+// Eight numbers side by side, by the compiler's vector types: two SSE or NEON registers, or one AVX register.
+
+#include <cstdint>
+#include <cstring>
+
+#include "kernels/base/lane.hpp"
+
+namespace stillmap {
+
+constexpr int32_t kLanes = 8;
+
+struct Mask8 {
+  using Bits = int32_t __attribute__((vector_size(32)));
+  Bits bits;  ///< each lane all ones or all zeros
+
+  /// One bit a lane, lane 0 lowest.
+  STILLMAP_HD uint32_t any() const {
+    int32_t all = 0;
+    for (int32_t i = 0; i < kLanes; ++i) all |= bits[i];
+    return static_cast<uint32_t>(all);
+  }
+};
+STILLMAP_HD Mask8 operator&(Mask8 a, Mask8 b) {
+  return {a.bits & b.bits};
+}
+STILLMAP_HD Mask8 operator|(Mask8 a, Mask8 b) {
+  return {a.bits | b.bits};
+}
+STILLMAP_HD Mask8 operator!(Mask8 a) {
+  return {~a.bits};
+}
+
+struct Int8 {
+  using Bits = Mask8::Bits;
+  Bits v;
+
+  Int8() = default;
+  STILLMAP_HD Int8(int32_t x) : v(Bits{x, x, x, x, x, x, x, x}) {}  // NOLINT(google-explicit-constructor)
+  STILLMAP_HD explicit Int8(Bits x) : v(x) {}
+  STILLMAP_HD int32_t operator[](int32_t lane) const { return v[lane]; }
+
+  STILLMAP_HD static Int8 load(const void* from) {
+    Int8 x;
+    std::memcpy(&x.v, from, sizeof(x.v));
+    return x;
+  }
+  STILLMAP_HD void store(void* to) const { std::memcpy(to, &v, sizeof(v)); }
+};
+STILLMAP_HD Int8 operator+(Int8 a, Int8 b) {
+  return Int8(a.v + b.v);
+}
+STILLMAP_HD Int8 operator-(Int8 a, Int8 b) {
+  return Int8(a.v - b.v);
+}
+STILLMAP_HD Int8 operator*(Int8 a, Int8 b) {
+  return Int8(a.v * b.v);
+}
+STILLMAP_HD Int8 operator&(Int8 a, Int8 b) {
+  return Int8(a.v & b.v);
+}
+STILLMAP_HD Int8 operator|(Int8 a, Int8 b) {
+  return Int8(a.v | b.v);
+}
+STILLMAP_HD Int8 operator^(Int8 a, Int8 b) {
+  return Int8(a.v ^ b.v);
+}
+STILLMAP_HD Int8 operator<<(Int8 a, int32_t bits) {
+  return Int8(a.v << bits);
+}
+STILLMAP_HD Int8 shift_right(Int8 a, int32_t bits) {
+  return Int8(a.v >> bits);
+}
+STILLMAP_HD Mask8 operator==(Int8 a, Int8 b) {
+  return {a.v == b.v};
+}
+STILLMAP_HD Mask8 operator!=(Int8 a, Int8 b) {
+  return {a.v != b.v};
+}
+STILLMAP_HD Mask8 operator<(Int8 a, Int8 b) {
+  return {a.v < b.v};
+}
+STILLMAP_HD Mask8 operator>(Int8 a, Int8 b) {
+  return {a.v > b.v};
+}
+
+struct Float8 {
+  using Bits = float __attribute__((vector_size(32)));
+  Bits v;
+
+  Float8() = default;
+  STILLMAP_HD Float8(float x) : v(Bits{x, x, x, x, x, x, x, x}) {}  // NOLINT(google-explicit-constructor)
+  STILLMAP_HD explicit Float8(Bits x) : v(x) {}
+  STILLMAP_HD float operator[](int32_t lane) const { return v[lane]; }
+
+  STILLMAP_HD static Float8 load(const float* from) {
+    Float8 x;
+    std::memcpy(&x.v, from, sizeof(x.v));
+    return x;
+  }
+  STILLMAP_HD void store(float* to) const { std::memcpy(to, &v, sizeof(v)); }
+  /// 0, 1, .. 7
+  STILLMAP_HD static Float8 ramp() { return Float8(Bits{0, 1, 2, 3, 4, 5, 6, 7}); }
+};
+STILLMAP_HD Float8 operator+(Float8 a, Float8 b) {
+  return Float8(a.v + b.v);
+}
+STILLMAP_HD Float8 operator-(Float8 a, Float8 b) {
+  return Float8(a.v - b.v);
+}
+STILLMAP_HD Float8 operator-(Float8 a) {
+  return Float8(-a.v);
+}
+STILLMAP_HD Float8 operator*(Float8 a, Float8 b) {
+  return Float8(a.v * b.v);
+}
+STILLMAP_HD Float8 operator/(Float8 a, Float8 b) {
+  return Float8(a.v / b.v);
+}
+STILLMAP_HD Float8& operator+=(Float8& a, Float8 b) {
+  return a = a + b;
+}
+STILLMAP_HD Mask8 operator<(Float8 a, Float8 b) {
+  return {a.v < b.v};
+}
+STILLMAP_HD Mask8 operator>(Float8 a, Float8 b) {
+  return {a.v > b.v};
+}
+STILLMAP_HD Mask8 operator<=(Float8 a, Float8 b) {
+  return {a.v <= b.v};
+}
+STILLMAP_HD Mask8 operator>=(Float8 a, Float8 b) {
+  return {a.v >= b.v};
+}
+
+template <>
+struct LaneTypes<Float8> {
+  using Int = Int8;
+  using Mask = Mask8;
+};
+
+STILLMAP_HD Float8 select(Mask8 which, Float8 yes, Float8 no) {
+  return Float8(which.bits ? yes.v : no.v);
+}
+STILLMAP_HD Int8 select(Mask8 which, Int8 yes, Int8 no) {
+  return Int8(which.bits ? yes.v : no.v);
+}
+STILLMAP_HD Float8 to_float(Int8 x) {
+  return Float8(__builtin_convertvector(x.v, Float8::Bits));
+}
+STILLMAP_HD Int8 to_int(Float8 x) {
+  return Int8(__builtin_convertvector(x.v, Int8::Bits));
+}
+
+/// One element a lane, from anywhere.
+template <class T>
+STILLMAP_HD Float8 gather_float(const T* base, Int8 index) {
+  Float8 out;
+  for (int32_t i = 0; i < kLanes; ++i) out.v[i] = static_cast<float>(base[index[i]]);
+  return out;
+}
+/// One 32-bit word a lane.
+STILLMAP_HD Int8 gather_word(const void* base, Int8 index) {
+  Int8 out;
+  for (int32_t i = 0; i < kLanes; ++i) {
+    int32_t word;
+    std::memcpy(&word, static_cast<const char*>(base) + 4 * static_cast<int64_t>(index[i]), 4);
+    out.v[i] = word;
+  }
+  return out;
+}
+
+}  // namespace stillmap
