@@ -2,6 +2,7 @@
 
 #include <cairo.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -12,6 +13,7 @@ namespace stillmap {
 namespace {
 
 constexpr const char* kFont = "DejaVu Sans";
+constexpr std::size_t kMaxPathPoints = 400;
 
 cairo_surface_t* surface_from(const Picture& picture) {
   cairo_surface_t* surface = cairo_image_surface_create(CAIRO_FORMAT_RGB24, picture.width, picture.height);
@@ -51,9 +53,9 @@ void Canvas::use(Colour colour) {
   cairo_set_source_rgba(context_.get(), colour.r, colour.g, colour.b, colour.a);
 }
 
-void Canvas::trace(const std::vector<Point>& points) {
+void Canvas::trace(const std::vector<Point>& points, std::size_t begin, std::size_t end) {
   cairo_new_path(context_.get());
-  for (const Point& p : points) cairo_line_to(context_.get(), p.x, p.y);
+  for (std::size_t i = begin; i < end; ++i) cairo_line_to(context_.get(), points[i].x, points[i].y);
 }
 
 void Canvas::text(Point at, const std::string& words, const TextStyle& style) {
@@ -98,7 +100,7 @@ void Canvas::outline(const Rect& rect, Colour colour, double width_px) {
 
 void Canvas::polygon(const std::vector<Point>& points, Colour colour) {
   use(colour);
-  trace(points);
+  trace(points, 0, points.size());
   cairo_fill(context_.get());
 }
 
@@ -107,8 +109,14 @@ void Canvas::line(const std::vector<Point>& points, Colour colour, double width_
   cairo_set_line_width(context_.get(), width_px);
   const double dashes[] = {8, 5};
   cairo_set_dash(context_.get(), dashes, dashed ? 2 : 0, 0);
-  trace(points);
-  cairo_stroke(context_.get());
+  // In pieces: cairo's time grows faster than the number of points that cross each other in one path.
+  std::size_t begin = 0;
+  do {
+    const std::size_t end = std::min(begin + kMaxPathPoints, points.size());
+    trace(points, begin, end);
+    cairo_stroke(context_.get());
+    begin = end - (end > 0 ? 1 : 0);
+  } while (begin + 1 < points.size());
   cairo_set_dash(context_.get(), nullptr, 0, 0);
 }
 

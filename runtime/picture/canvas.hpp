@@ -76,7 +76,7 @@ class Canvas {
     void operator()(_cairo_surface* surface) const;
   };
   void use(Colour colour);
-  void trace(const std::vector<Point>& points);
+  void trace(const std::vector<Point>& points, std::size_t begin, std::size_t end);
 
   int width_, height_;
   std::unique_ptr<_cairo_surface, Destroy> surface_;

@@ -111,9 +111,28 @@ std::vector<Point> Plot::to_page(const std::vector<Point>& values) const {
   return points;
 }
 
+std::vector<Point> thinned(const std::vector<Point>& points) {
+  constexpr std::size_t kFew = 4000;
+  if (points.size() <= kFew) return points;
+  std::vector<Point> some;
+  std::size_t begin = 0;
+  for (std::size_t i = 1; i <= points.size(); ++i) {
+    if (i < points.size() && std::floor(points[i].x) == std::floor(points[begin].x)) continue;
+    // A run inside one column of pixels: where it begins, its extremes and where it ends say all of it.
+    const auto from = points.begin() + static_cast<std::ptrdiff_t>(begin),
+               to = points.begin() + static_cast<std::ptrdiff_t>(i);
+    auto [low, high] =
+        std::minmax_element(from, to, [](const Point& a, const Point& b) { return a.y < b.y; });
+    if (high < low) std::swap(low, high);
+    some.insert(some.end(), {*from, *low, *high, *(to - 1)});
+    begin = i;
+  }
+  return some;
+}
+
 void Plot::line(const std::vector<Point>& values, Colour colour, double width_px, bool dashed) {
   canvas_.clip(inner_);
-  canvas_.line(to_page(values), colour, width_px, dashed);
+  canvas_.line(thinned(to_page(values)), colour, width_px, dashed);
   canvas_.unclip();
 }
 

@@ -26,6 +26,10 @@ struct PlotLabels {
   std::string title, x, y;
 };
 
+/// Fewer points of a line on the page that look the same: of each stretch inside one column of pixels its
+/// first and last, its lowest and highest.                                         test: plot_test
+std::vector<Point> thinned(const std::vector<Point>& points);
+
 enum class Mark : uint8_t { line, dashed, box, dot };
 
 /// One name of a legend with its mark before it.

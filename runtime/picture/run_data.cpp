@@ -43,10 +43,10 @@ Result<std::vector<Row>> read_table(const std::string& path, const std::vector<s
     ++number;
     if (line.empty()) continue;
     const std::vector<std::string_view> cells = split(line, ',');
-    if (number == 1) {
+    if (columns.empty()) {
       for (const std::string_view name : names) {
         const auto cell = std::find(cells.begin(), cells.end(), name);
-        if (cell == cells.end()) return Error{fmt::format("{}:1: has no column '{}'", path, name)};
+        if (cell == cells.end()) return Error{fmt::format("{}:{}: has no column '{}'", path, number, name)};
         columns.push_back(static_cast<std::size_t>(cell - cells.begin()));
       }
       continue;

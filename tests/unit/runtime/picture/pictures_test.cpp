@@ -274,6 +274,13 @@ TEST_F(Pictures, BrokenInputsAreErrorsThatNameTheFile) {
   }
 }
 
+TEST_F(Pictures, ABlankFirstLineIsNoHeader) {
+  dir_.write("timing.csv", "\n1,2,3,4,5,6,7\n");
+  const PictureOutcome outcome = outcome_of("timing.png");
+  EXPECT_EQ(outcome.state, PictureState::failed);
+  EXPECT_NE(outcome.why.find("timing.csv:2: has no column"), std::string::npos) << outcome.why;
+}
+
 TEST_F(Pictures, AMaskOfAnotherSizeIsAnError) {
   write_snapshots();
   ASSERT_TRUE(Canvas(32, 48).write_png(dir_.path("snapshots/1305031229.433100_mask.png")));

@@ -1,5 +1,6 @@
 #include "runtime/picture/plot.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -47,6 +48,22 @@ TEST(Plot, EqualScalesMakeAMetreAsLongBothWays) {
   const double metre_x = plot.to_page(Point{1, 0}).x - plot.to_page(Point{0, 0}).x;
   const double metre_y = plot.to_page(Point{0, 0}).y - plot.to_page(Point{0, 1}).y;
   EXPECT_NEAR(metre_x, metre_y, 1e-9);
+}
+
+TEST(Thinned, KeepsExtremesAndEnds) {
+  std::vector<Point> few = {{0, 1}, {0.1, 2}, {0.2, 3}};
+  EXPECT_EQ(thinned(few).size(), 3u);
+  std::vector<Point> many;
+  for (int i = 0; i < 100'000; ++i)
+    many.push_back({i * 0.01, i == 54'321 ? 77.0 : i == 54'322 ? -33.0 : (i % 7) * 0.1});
+  const std::vector<Point> some = thinned(many);
+  EXPECT_LE(some.size(), 4100u);
+  EXPECT_EQ(some.front().x, many.front().x);
+  EXPECT_EQ(some.back().x, many.back().x);
+  const auto is = [](double y) { return [y](const Point& p) { return p.y == y; }; };
+  EXPECT_EQ(std::count_if(some.begin(), some.end(), is(77.0)), 1);
+  EXPECT_EQ(std::count_if(some.begin(), some.end(), is(-33.0)), 1);
+  for (std::size_t i = 1; i < some.size(); ++i) ASSERT_GE(some[i].x, some[i - 1].x);
 }
 
 }  // namespace
