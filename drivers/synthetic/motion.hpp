@@ -2,6 +2,7 @@
 
 // How things move in the scenes: smooth functions of time, seconds and metres.
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <span>
@@ -109,7 +110,13 @@ template <class Path>
 Stance walk(const Path& path, double t_s, Spot2 facing) {
   const Spot2 here = path(t_s);
   const Spot2 velocity = (1.0 / 0.6) * (path(t_s + 0.3) - path(t_s - 0.3));
-  const Spot2 front = velocity + facing;
+  // Nobody turns on the spot: the direction is the mean over a second.
+  Spot2 front;
+  for (int i = -4; i <= 4; ++i) {
+    const double at_s = t_s + 0.12 * i;
+    const Spot2 step = (1.0 / 0.6) * (path(at_s + 0.3) - path(at_s - 0.3)) + facing;
+    front = front + (1.0 / std::max(std::hypot(step.x, step.y), 1e-6)) * step;
+  }
   const double speed = std::hypot(velocity.x, velocity.y);
   Stance stance;
   stance.feet_m = {static_cast<float>(here.x), static_cast<float>(here.y), 0.0f};

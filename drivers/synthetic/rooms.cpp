@@ -194,7 +194,7 @@ void bare_room(World& world) {
                       {Pattern::paint, {150, 110, 90}, {134, 98, 80}, 0.4f, 3}, 0.2f));
   add(world, make_box({1.95f, 1.25f, 0.70f}, {0.30f, 0.30f, 0.70f},
                       {Pattern::paint, {96, 116, 140}, {84, 102, 124}, 0.4f, 4}, -0.35f));
-  add(world, make_box({-0.20f, 1.62f, 0.35f}, {0.50f, 0.28f, 0.35f},
+  add(world, make_box({1.00f, 1.67f, 0.35f}, {0.40f, 0.26f, 0.35f},
                       {Pattern::paint, {120, 140, 104}, {106, 124, 92}, 0.4f, 5}, 0.1f));
   add(world, make_box({0.50f, -1.66f, 0.55f}, {0.30f, 0.24f, 0.55f},
                       {Pattern::paint, {168, 150, 96}, {150, 134, 86}, 0.4f, 6}, 0.3f));

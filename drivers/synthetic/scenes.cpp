@@ -18,7 +18,7 @@ constexpr Spot2 kSouthCorner = {-1.25, -1.40};
 constexpr Spot2 kWideSouthWing = {-0.60, -1.18};  // for who carries something
 
 const Material kCarton = {Pattern::poster, {176, 134, 90}, {210, 180, 140}, 0.11f, 21};
-const Material kBigCarton = {Pattern::cloud, {150, 112, 74}, {196, 158, 112}, 0.09f, 22};
+const Material kBigCarton = {Pattern::cloud, {176, 136, 92}, {224, 186, 136}, 0.09f, 22};
 
 Vec3 to_float(double x, double y, double z) {
   return {static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)};
@@ -177,7 +177,7 @@ void crowd_start_movers(double t, World& world) {
 
 Se3d crowd_close_camera(double t) {
   static const Sway sway = {
-      {-1.50, 0.0, 1.36}, {0.06, 0.26, 0.05}, {6.3, 4.2, 4.9}, 0, 10, 5.3, -6, 2.5, 4.7};
+      {-1.50, 0.0, 1.36}, {0.06, 0.26, 0.05}, {6.3, 4.2, 4.9}, 0, 26, 6.7, -6, 2.5, 4.7};
   return sway_camera(sway, t);
 }
 
@@ -198,23 +198,60 @@ void crowd_close_movers(double t, World& world) {
 // ---- boxes
 // ----------------------------------------------------------------------------------------------------
 
+/// A box that stands close before the camera when the scene begins, so that it is mapped. Somebody comes from
+/// behind it, and slowly moves it: hardest for whoever trusts the larger part of the picture.
+struct Haul {
+  Vec3 half_m;
+  float rest_height_m;  ///< of its centre
+  double come_s;        ///< the person walks in ...
+  double moves_s;       ///< ... and the box moves from here on
+  uint32_t look;
+};
+
+template <class Place>
+void haul(const Haul& h, const Place& place, double t, World& world) {
+  const Spot2 rest = place(0.0), behind = {static_cast<double>(h.half_m.x) + 0.36, 0.0};
+  const std::array<Waypoint, 4> way = {{{h.come_s, kWideSouthWing},
+                                        {h.come_s + 0.35 * (h.moves_s - h.come_s), {rest.x + 0.30, -0.98}},
+                                        {h.come_s + 0.65 * (h.moves_s - h.come_s), {rest.x + 0.70, -0.70}},
+                                        {h.moves_s - 0.4, rest + behind}}};
+  const auto path = [&](double s) { return along(way, s) + (place(s) - rest); };
+  Stance person = walk(path, t, mixed({-0.4, 0.0}, {-3.0, 0.0}, rise(h.moves_s - 1.3, h.moves_s - 0.2, t)));
+  const Spot2 at = place(t);
+  const double lifted = rise(h.moves_s, h.moves_s + 1.5, t);
+  const Vec3 centre = to_float(at.x, at.y, static_cast<double>(h.rest_height_m) + 0.05 * lifted);
+  const auto yaw = static_cast<float>(0.08 * lifted * wave(t, 5.3));
+  hold(person, centre, h.half_m, yaw, 1.12f - h.rest_height_m, rise(h.moves_s - 0.6, h.moves_s - 0.05, t));
+  add_person(world, person, h.look);
+  add_box(world, centre, h.half_m, yaw, kBigCarton, t > h.moves_s);
+}
+
+/// What such a box stands on.
+void add_table(World& world, Spot2 at, float half_x, float half_y, float height_m) {
+  add_box(world, to_float(at.x, at.y, 0.5 * static_cast<double>(height_m)), {half_x, half_y, 0.5f * height_m},
+          0.0f, {Pattern::planks, {70, 60, 52}, {130, 116, 100}, 0.10f, 7}, false);
+}
+
+constexpr Haul kMovingBox = {{0.16f, 0.44f, 0.38f}, 0.84f + 0.38f, 0.7, 3.4, 1};
+constexpr Spot2 kMovingBoxRest = {-0.28, 0.0};
+
+void furnished_with_table(World& world) {
+  furnished_room(world);
+  add_table(world, kMovingBoxRest, kMovingBox.half_m.x, kMovingBox.half_m.y,
+            kMovingBox.rest_height_m - kMovingBox.half_m.z);
+}
+
 Se3d moving_box_camera(double t) {
-  static const Sway sway = {{-1.40, 0.0, 1.36}, {0.10, 0.36, 0.07}, {6.3, 4.8, 4.9}, 0, 9, 5.7, -5, 2.5, 4.7};
+  static const Sway sway = {{-1.44, 0.0, 1.36}, {0.05, 0.30, 0.07}, {6.3, 4.8, 4.9}, 0, 9, 5.7, -5, 2.5, 4.7};
   return sway_camera(sway, t);
 }
 
 void moving_box_movers(double t, World& world) {
-  const auto path = [](double s) {
-    const double slow = from_rest(std::max(0.0, s - 1.0), 2.0);
-    return mixed(kWideSouthWing, Spot2{0.22 + 0.16 * wave(slow, 6.9), 0.50 * wave(slow, 7.4, 0.2)},
-                 rise(0.9, 3.6, s));
+  const auto place = [](double s) {
+    const double moved = from_rest(std::max(0.0, s - kMovingBox.moves_s), 3.0);
+    return kMovingBoxRest + Spot2{0.14 * (1.0 - std::cos(kTurn * moved / 7.9)), 0.42 * wave(moved, 8.6)};
   };
-  Stance person = walk(path, t, {-0.8, 0});
-  const Vec3 half = {0.19f, 0.29f, 0.23f};
-  const Vec3 centre = before(person, 0.40f, 1.14f + 0.10f * static_cast<float>(wave(t, 4.2)));
-  hold(person, centre, half, person.yaw, -0.05f);
-  add_person(world, person, 1);
-  add_box(world, centre, half, person.yaw, kCarton, true);
+  haul(kMovingBox, place, t, world);
 }
 
 const Sway& obstructing_sway() {
@@ -226,35 +263,20 @@ Se3d obstructing_camera(double t) {
   return sway_camera(obstructing_sway(), t);
 }
 
+constexpr Haul kObstructingBox = {{0.12f, 0.40f, 0.82f}, 0.82f, 0.0, 3.0, 4};
+
 void obstructing_movers(double t, World& world) {
-  // The box is led with the camera: from beside it to 0.8 m before the lens, held there, then away into the
+  // Led slowly to 0.8 m before the lens, held there while the camera goes on to sway, then back into the
   // room.
-  const auto relative = [](double s) {
-    static constexpr std::array<Waypoint, 7> way = {{{0.8, {0.10, -1.15}},
-                                                     {2.2, {0.75, -1.05}},
-                                                     {3.6, {0.86, -0.02}},
-                                                     {6.4, {0.86, 0.03}},
-                                                     {7.4, {1.15, -0.05}},
-                                                     {9.6, {1.45, 0.25}},
-                                                     {12.0, {1.40, -0.25}}}};
-    return along(way, s);
-  };
-  const auto place = [&](double s) {
+  const auto place = [](double s) {
     const Vec3d camera = sway_place(obstructing_sway(), s);
-    const double yaw = sway_yaw(obstructing_sway(), s) * rise(1.5, 3.4, s) * (1.0 - rise(6.6, 7.6, s));
-    const Spot2 r = relative(s);
-    return Spot2{camera.x + std::cos(yaw) * r.x - std::sin(yaw) * r.y,
-                 camera.y + std::sin(yaw) * r.x + std::cos(yaw) * r.y};
+    const double yaw = sway_yaw(obstructing_sway(), s);
+    const Spot2 near_by = {camera.x + 0.88 * std::cos(yaw), camera.y + 0.88 * std::sin(yaw)};
+    const Spot2 rest = {-0.02, 0.0}, away = {0.20 + 0.08 * wave(s, 4.1), 0.30 * wave(s, 5.9)};
+    const double near_share = rise(kObstructingBox.moves_s, 5.4, s);
+    return mixed(mixed(rest, near_by, near_share), away, rise(7.6, 9.9, s));
   };
-  const Vec3 half = {0.12f, 0.46f, 0.38f};
-  const Spot2 box = place(t);
-  const float height = 1.30f + 0.02f * static_cast<float>(wave(t, 3.1));
-  const auto yaw = static_cast<float>(0.5 * kTurn + 0.06 * wave(t, 3.7));
-  const Vec3 centre = {static_cast<float>(box.x), static_cast<float>(box.y), height};
-  Stance person = walk([&](double s) { return place(s) + Spot2{0.36, 0.0}; }, t, {-3.0, 0});
-  hold(person, centre, half, yaw, -0.15f);
-  add_person(world, person, 4);
-  add_box(world, centre, half, yaw, kBigCarton, true);
+  haul(kObstructingBox, place, t, world);
 }
 
 // A stand on which a box is put, or from which it is taken.
@@ -270,11 +292,6 @@ void add_stand(World& world) {
 
 void furnished_with_stand(World& world) {
   furnished_room(world);
-  add_stand(world);
-}
-
-void bare_with_stand(World& world) {
-  bare_room(world);
   add_stand(world);
 }
 
@@ -344,8 +361,27 @@ void carry_off(double t, double come_s, double take_s, double leave_s, uint32_t 
 void removing_movers(double t, World& world) {
   carry_off(t, 0.8, 3.8, 10.6, 2, world);
 }
+
+constexpr Haul kKidnappedBox = {{0.18f, 0.38f, 0.32f}, 0.86f + 0.32f, 1.6, 4.4, 5};
+constexpr Spot2 kKidnappedRest = {-0.36, 0.0};
+
+void bare_with_table(World& world) {
+  bare_room(world);
+  add_table(world, kKidnappedRest, kKidnappedBox.half_m.x, kKidnappedBox.half_m.y,
+            kKidnappedBox.rest_height_m - kKidnappedBox.half_m.z);
+}
+
 void kidnapping_movers(double t, World& world) {
-  carry_off(t, 2.4, 4.6, 12.0, 5, world);
+  const auto place = [](double s) {
+    static constexpr std::array<Waypoint, 6> way = {{{kKidnappedBox.moves_s, kKidnappedRest},
+                                                     {6.6, {-0.32, 0.22}},
+                                                     {8.2, {-0.18, 0.34}},
+                                                     {10.2, {0.10, -0.10}},
+                                                     {12.0, {-0.20, -0.62}},
+                                                     {13.6, {-0.60, -1.15}}}};
+    return along(way, s);
+  };
+  haul(kKidnappedBox, place, t, world);
 }
 
 constexpr Vec3 kCrateHalf = {0.20f, 0.42f, 0.64f};
@@ -374,9 +410,9 @@ void placing_obstructing_movers(double t, World& world) {
   add_person(world, person, 3);
   const Stance helper = walk(
       [](double s) {
-        return mixed(kNorthWing, Spot2{0.80, 0.55 * wave(s, 5.1)}, rise(2.0, 4.6, s));
+        return mixed(kNorthWing, Spot2{0.80, 0.55 * wave(s, 5.1)}, rise(2.0, 5.4, s));
       },
-      t, kToCamera);
+      t, {-0.45, 0.0});
   add_person(world, helper, 0);
   add_box(world, centre, kCrateHalf, yaw, kBigCarton, moving);
 }
@@ -409,8 +445,10 @@ void person_tracking_movers(double t, World& world) {
   add_person(world, walk(tracked_person, t, {-0.2 * rate * std::sin(turn), 0.2 * rate * std::cos(turn)}), 4);
 }
 
+/// The camera pans over the bare room; two people go round with it, one at each side of the view, so that one
+/// of them always leads into what has not been seen yet.
 const Sway& synchronous_sway() {
-  static const Sway sway = {{-1.35, 0.0, 1.36}, {0.10, -0.44, 0.04}, {8.0, 6.4, 4.9}, 0, 3, 5.7, -6, 2, 4.7};
+  static const Sway sway = {{-0.62, 0.0, 1.36}, {0.06, 0.10, 0.04}, {8.0, 5.1, 4.9}, 0, 44, 10.5, -5, 2, 4.7};
   return sway;
 }
 
@@ -419,14 +457,18 @@ Se3d synchronous_camera(double t) {
 }
 
 void synchronous_movers(double t, World& world) {
-  const Spot2 offsets[2] = {{1.22, 0.34}, {1.36, -0.36}};
-  const Spot2 wings[2] = {{0.42, 1.10}, {0.42, -1.10}};
   for (int who = 0; who < 2; ++who) {
+    const double side = who == 0 ? 1.0 : -1.0;
     const auto path = [&](double s) {
       const Vec3d camera = sway_place(synchronous_sway(), s);
-      return Spot2{camera.x, camera.y} + mixed(wings[who], offsets[who], rise(0.8, 3.4, s));
+      const double in = rise(0.8, 2.8, s);
+      const double bearing = sway_yaw(synchronous_sway(), s) + side * kDegree * (75.0 - 58.0 * in);
+      const double distance = 1.12 + 0.06 * side;
+      return Spot2{camera.x + distance * std::cos(bearing), camera.y + distance * std::sin(bearing)};
     };
-    add_person(world, walk(path, t, {-0.5, 0}), static_cast<uint32_t>(1 + 2 * who));
+    const double yaw = sway_yaw(synchronous_sway(), t);
+    add_person(world, walk(path, t, {-0.9 * std::cos(yaw), -0.9 * std::sin(yaw)}),
+               static_cast<uint32_t>(1 + 2 * who));
   }
 }
 
@@ -440,14 +482,14 @@ const std::vector<Scene>& all_scenes() {
       {"crowd", 12, true, furnished_room, crowd_movers, crowd_camera},
       {"crowd_start", 12, true, furnished_room, crowd_start_movers, crowd_camera},
       {"crowd_close", 12, true, bare_room, crowd_close_movers, crowd_close_camera},
-      {"moving_box", 12, true, furnished_room, moving_box_movers, moving_box_camera},
+      {"moving_box", 12, true, furnished_with_table, moving_box_movers, moving_box_camera},
       {"obstructing_box", 12, true, furnished_room, obstructing_movers, obstructing_camera},
       {"placing_box", 14, true, furnished_with_stand, placing_movers, stand_camera},
       {"removing_box", 13, true, furnished_with_stand, removing_movers, stand_camera},
       {"placing_obstructing_box", 12, true, furnished_room, placing_obstructing_movers, stand_camera},
       {"person_tracking", 14, true, furnished_room, person_tracking_movers, person_tracking_camera},
       {"synchronous", 12, true, bare_room, synchronous_movers, synchronous_camera},
-      {"kidnapping_box", 14, true, bare_with_stand, kidnapping_movers, stand_camera},
+      {"kidnapping_box", 14, true, bare_with_table, kidnapping_movers, moving_box_camera},
       {"loop", 20, false, furnished_room, no_movers, loop_camera},
       {"fast", 10, false, furnished_room, no_movers, fast_camera}};
   return scenes;
