@@ -6,8 +6,10 @@
 #include "firmware-like/commands/command.hpp"
 #include "runtime/core/version.hpp"
 
-int main(int argc, char** argv) {
-  using namespace stillmap;
+namespace stillmap {
+namespace {
+
+int run_program(int argc, char** argv) {
   CLI::App app("Tracks an RGB-D camera, throws out whatever moves and maps what stands still.", "stillmap");
   app.set_version_flag("--version", std::string("stillmap ") + version());
   app.require_subcommand(0, 1);
@@ -22,14 +24,23 @@ int main(int argc, char** argv) {
   add_memory_plan(app, exit_code);
   add_check_config(app, exit_code);
   add_parts_not_built(app, exit_code);
-
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? kExitDone : kExitUsage;
-  } catch (const std::exception& error) {  // what no border caught: memory, a defect
-    return fail(error.what(), ErrorKind::failed);
   }
   if (!app.get_subcommands().empty()) return exit_code;
   return fail("a subcommand is needed\n" + app.help(), ErrorKind::bad_usage);
+}
+
+}  // namespace
+}  // namespace stillmap
+
+int main(int argc, char** argv) {
+  try {
+    return stillmap::run_program(argc, argv);
+  } catch (const std::exception& error) {  // what no border caught: memory, or a defect
+    std::fprintf(stderr, "stillmap: %s\n", error.what());
+    return stillmap::kExitFailed;
+  }
 }
