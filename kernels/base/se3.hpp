@@ -104,14 +104,15 @@ STILLMAP_HD Vec3T<T> log_rotation(const Mat3T<T>& r) {
   const T sine = T(0.5) * norm(axis2);
   const T cosine = T(0.5) * (r(0, 0) + r(1, 1) + r(2, 2) - T(1));
   const T angle = atan2(sine, cosine);
-  if (sine > T(1e-3)) return (T(0.5) * angle / sine) * axis2;
-  if (cosine > T(0)) return T(0.5) * axis2;  // near identity: angle / sine -> 1
-  // Near pi: the axis is the largest column of (R + I) / 2, its sign from what is left of the skew part.
+  if (sine > T(1e-3) || (cosine > T(0) && sine > T(0))) return (T(0.5) * angle / sine) * axis2;
+  if (cosine > T(0)) return T(0.5) * axis2;
+  // Near pi: (R + R^T) / 2 - cos I = (1 - cos) axis axis^T; the axis is its largest column, the sign comes
+  // from what is left of the skew part.
   int k = 0;
   for (int i = 1; i < 3; ++i)
     if (r(i, i) > r(k, k)) k = i;
-  Vec3T<T> column = {r(0, k), r(1, k), r(2, k)};
-  (k == 0 ? column.x : k == 1 ? column.y : column.z) += T(1);
+  Vec3T<T> column = T(0.5) * Vec3T<T>{r(0, k) + r(k, 0), r(1, k) + r(k, 1), r(2, k) + r(k, 2)};
+  (k == 0 ? column.x : k == 1 ? column.y : column.z) -= cosine;
   const Vec3T<T> axis = normalized(column);
   return (dot(axis, axis2) < T(0) ? -angle : angle) * axis;
 }
