@@ -8,6 +8,7 @@
 #include <cstring>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -40,6 +41,13 @@ struct SuiteOptions {
   std::string dir, out = "out/suite";
   std::vector<std::string> configs;
 };
+
+/// Says what is wrong with it, nothing when it is a time above 0.
+std::string positive_seconds(const std::string& text) {
+  const std::optional<double> value = parse_number(text);
+  return value && *value > 0 ? std::string()
+                             : fmt::format("'{}': expected a number of seconds above 0", text);
+}
 
 int print(const std::string& text) {
   const bool written =
@@ -145,7 +153,7 @@ void add_ate(CLI::App& evaluate, int& exit_code) {
   command->add_option("--truth", options->truth, "true trajectory, TUM format")->required();
   command->add_option("--estimate", options->estimate, "estimated trajectory, TUM format")->required();
   command->add_option("--max-dt", options->max_dt_s, "poses match when their stamps differ by less, s")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_seconds, "SECONDS")
       ->capture_default_str();
   command->add_flag("--json", options->json, "print JSON");
   command->callback([options, &exit_code] { exit_code = evaluate_ate(*options); });
@@ -157,7 +165,7 @@ void add_rpe(CLI::App& evaluate, int& exit_code) {
   command->add_option("--truth", options->truth, "true trajectory, TUM format")->required();
   command->add_option("--estimate", options->estimate, "estimated trajectory, TUM format")->required();
   command->add_option("--delta-s", options->delta_s, "time between the poses of a pair, s")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_seconds, "SECONDS")
       ->capture_default_str();
   command->add_flag("--json", options->json, "print JSON");
   command->add_option("--csv", options->csv, "write the error over time here: stamp,trans_m,rot_deg");
