@@ -1,0 +1,170 @@
+#include "kernels/integrate/visible_blocks.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "kernels/backend/cpu/loops.hpp"
+#include "tests/support/analytic_map.hpp"
+#include "tests/support/range_pyramid.hpp"
+#include "tests/support/test_image.hpp"
+
+namespace stillmap {
+namespace {
+
+using test::RangePyramid;
+using test::TestImage;
+
+constexpr int32_t kRows = 60, kCols = 80;
+constexpr float kVoxelM = 0.02f, kTruncationM = 0.08f;
+
+/// A random depth image (rectangles at random depth, some without measurement) and a random pose.
+class RandomFrame {
+ public:
+  explicit RandomFrame(uint32_t seed) : depth_(kRows, kCols), ranges_(kRows, kCols), random_(seed) {
+    fill({0, kRows}, {0, kCols}, uniform(1.5f, 3.5f));
+    for (int n = 0; n < 5; ++n) {
+      const auto r = static_cast<int32_t>(uniform(0, kRows)), c = static_cast<int32_t>(uniform(0, kCols));
+      fill({r, std::min(kRows, r + 20)}, {c, std::min(kCols, c + 25)}, n % 4 ? uniform(0.7f, 3.5f) : 0.0f);
+    }
+    ranges_.build(depth_.view(), {});
+    const Vec3 axis = normalized(Vec3{uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)});
+    pass.T_cam_map = inverse(exp(Twist{{}, uniform(0, 3) * axis}));
+    pass.T_cam_map.translation = {uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)};
+    pass.geometry = {
+        ranges_.static_depth(), {70, 70, 39.5f, 29.5f, kCols, kRows}, 0.3f, 2.5f, 3.0f, kTruncationM};
+    pass.ranges = ranges_.view();
+    pass.map = map.view();
+    pass.free_space = true;
+    enclose();
+  }
+
+  AnalyticMap map{64, kVoxelM, kTruncationM};
+  VisibleGroupPass pass{};
+
+ private:
+  float uniform(float low, float high) { return std::uniform_real_distribution<float>(low, high)(random_); }
+  struct Range {
+    int32_t first, end;
+  };
+  void fill(Range rows, Range cols, float z_m) {
+    for (int32_t r = rows.first; r < rows.end; ++r)
+      for (int32_t c = cols.first; c < cols.end; ++c) depth_.view().at(r, c) = z_m;
+  }
+  /// A box of groups around all that the camera can see, with room.
+  void enclose() {
+    const Se3 T_map_cam = inverse(pass.T_cam_map);
+    const float group_m = kVoxelM * kBlockEdge * kGroupEdge, reach_m = 4.0f;
+    const auto cell = [&](float x) { return static_cast<int32_t>(std::floor(x / group_m)); };
+    const Vec3 c = T_map_cam.translation;
+    pass.first_group = {cell(c.x - reach_m), cell(c.y - reach_m), cell(c.z - reach_m)};
+    const Int3 last = {cell(c.x + reach_m), cell(c.y + reach_m), cell(c.z + reach_m)};
+    pass.groups = {last.x - pass.first_group.x + 1, last.y - pass.first_group.y + 1,
+                   last.z - pass.first_group.z + 1};
+  }
+
+  TestImage<float> depth_;
+  RangePyramid ranges_;
+  std::mt19937 random_;
+};
+
+/// What `observe` says about the voxels of a block.
+struct Seen {
+  int32_t free = 0, band = 0;
+};
+Seen look_at_voxels(const VisibleGroupPass& pass, Int3 block) {
+  Seen seen;
+  const VoxelGrid grid(pass.T_cam_map, block, pass.map.voxel_m);
+  for (int32_t i = 0; i < kBlockVoxels; ++i) {
+    const Observation<float> o =
+        observe(pass.geometry, grid.position(static_cast<float>(i & 7), i >> 3 & 7, i >> 6));
+    seen.free += o.free;
+    seen.band += o.band;
+  }
+  return seen;
+}
+
+TEST(VisibleBlocks, EveryVoxelThatIsSeenLiesInAListedBlockAndFreeBlocksAreFree) {
+  for (uint32_t seed = 1; seed <= 4; ++seed) {
+    RandomFrame frame(seed);
+    const VisibleGroupPass& pass = frame.pass;
+    const auto count = static_cast<uint32_t>(pass.groups.x * pass.groups.y * pass.groups.z);
+    int32_t listed = 0, free = 0, useless = 0;
+    for (uint32_t g = 0; g < count; ++g) {
+      const GroupView view = best_loops().visible_group(pass, g);
+      EXPECT_EQ(view.free & view.mixed, 0u);
+      for (int32_t bit = 0; bit < kGroupBlocks; ++bit) {
+        const bool is_free = view.free >> bit & 1, is_mixed = view.mixed >> bit & 1;
+        // Far groups are not looked at voxel by voxel: they are out of reach and must be empty.
+        const Vec3 p_cam = pass.T_cam_map * voxel_position(first_voxel(pass.block_at(g, bit)), kVoxelM);
+        if (!is_free && !is_mixed && (p_cam.z < 0.0f || p_cam.z > 3.3f)) continue;
+        const Seen seen = look_at_voxels(pass, pass.block_at(g, bit));
+        if (is_free) {
+          EXPECT_EQ(seen.free, kBlockVoxels);
+          ++free;
+        } else if (is_mixed) {
+          useless += seen.free + seen.band == 0;
+        } else {
+          EXPECT_EQ(seen.free + seen.band, 0) << "seed " << seed << " group " << g << " block " << bit;
+        }
+        listed += is_free || is_mixed;
+      }
+    }
+    EXPECT_GT(listed, 100);
+    EXPECT_GT(free, 20) << "seed " << seed;
+    EXPECT_EQ(useless, 0);  // none is in the map yet: a block is listed only for a voxel of its own
+  }
+}
+
+TEST(VisibleBlocks, PlainVoxelsAndRowsListTheSame) {
+  RandomFrame frame(9);
+  const auto count = static_cast<uint32_t>(frame.pass.groups.x * frame.pass.groups.y * frame.pass.groups.z);
+  for (uint32_t g = 0; g < count; ++g) {
+    const GroupView plain = frame.pass(g, PlainVoxels{});
+    const GroupView rows = kLoopsBaseline.visible_group(frame.pass, g);
+    EXPECT_EQ(plain.free, rows.free);
+    EXPECT_EQ(plain.mixed, rows.mixed);
+  }
+}
+
+TEST(VisibleBlocks, WithoutFreeSpaceOnlyTheBandAndWhatIsThereAreListed) {
+  RandomFrame frame(4);
+  frame.pass.free_space = false;
+  const auto count = static_cast<uint32_t>(frame.pass.groups.x * frame.pass.groups.y * frame.pass.groups.z);
+  for (uint32_t g = 0; g < count; ++g) {
+    const GroupView view = best_loops().visible_group(frame.pass, g);
+    EXPECT_EQ(view.free, 0u);
+    for (int32_t bit = 0; bit < kGroupBlocks; ++bit) {
+      const bool listed = view.mixed >> bit & 1;
+      EXPECT_TRUE(!listed || look_at_voxels(frame.pass, frame.pass.block_at(g, bit)).band > 0);
+    }
+  }
+  // A block in the map that is now seen free is listed all the same: it is to be carved.
+  frame.pass.free_space = true;
+  for (uint32_t g = 0; g < count; ++g) {
+    const GroupView view = best_loops().visible_group(frame.pass, g);
+    if (view.free == 0) continue;
+    const int32_t bit = __builtin_ctzll(view.free);
+    ASSERT_NE(frame.map.block(frame.pass.block_at(g, bit)), nullptr);
+    frame.pass.free_space = false;
+    EXPECT_EQ(best_loops().visible_group(frame.pass, g).free, 1ull << bit);
+    break;
+  }
+}
+
+TEST(VisibleBlocks, NothingIsListedWhenNothingWasMeasured) {
+  RandomFrame frame(5);
+  const TestImage<float> nothing(kRows, kCols);
+  RangePyramid ranges(kRows, kCols);
+  ranges.build(nothing.view(), {});
+  frame.pass.ranges = ranges.view();
+  frame.pass.geometry.static_depth_m = ranges.static_depth();
+  const auto count = static_cast<uint32_t>(frame.pass.groups.x * frame.pass.groups.y * frame.pass.groups.z);
+  for (uint32_t g = 0; g < count; ++g) {
+    const GroupView view = best_loops().visible_group(frame.pass, g);
+    EXPECT_EQ(view.free | view.mixed, 0u);
+  }
+}
+
+}  // namespace
+}  // namespace stillmap
