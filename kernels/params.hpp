@@ -123,6 +123,7 @@ struct MapParams {
   float truncation_m = 0.1f;
   int32_t pool_blocks = 110000;
   float high_water = 0.98f;
+  int32_t mesh_min_weight = 3;
 
   template <class F>
   static void fields(F&& f) {
@@ -133,6 +134,8 @@ struct MapParams {
       "fixed at boot; the hash table has twice as many slots or more");
     f("high_water", &P::high_water, 0.1, 1.0, "share", "ours",
       "above this fill the blocks farthest from the camera are dropped");
+    f("mesh_min_weight", &P::mesh_min_weight, 1, 255, "observations", "ours",
+      "voxels seen less often do not make a mesh");
   }
 };
 

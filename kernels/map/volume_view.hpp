@@ -18,6 +18,7 @@ struct VolumeView {
                                ///< changes nothing
   float voxel_m = 0.01f;
   float truncation_m = 0.1f;
+  int32_t mesh_min_weight = 1;  ///< voxels observed less often do not make a mesh, at least 1
 
   STILLMAP_HD float sdf_unit_m() const { return truncation_m / static_cast<float>(kSdfMax); }
 };

@@ -28,6 +28,7 @@ void MapStorage::carve(Arena& arena, const MapParams& params) {
   const uint64_t blocks = static_cast<uint64_t>(params.pool_blocks), slots = table_slots(params.pool_blocks);
   view_.voxel_m = params.voxel_m;
   view_.truncation_m = params.truncation_m;
+  view_.mesh_min_weight = params.mesh_min_weight;
   view_.table.keys = arena.take<BlockKey>("map: block table", slots);
   view_.table.blocks = arena.take<BlockId>("map: block table", slots);
   view_.blocks = arena.take<VoxelBlock>("map: voxel blocks", blocks);
