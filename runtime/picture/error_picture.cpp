@@ -142,7 +142,8 @@ Painted paint_error(const RunInputs& inputs) {
     shade_states(plot, states, start);
     plot.line(panel.values, panel.colour, 1.8);
     if (i == 0 && any_bad)
-      plot.legend({{"tracking poor", kPoorColour, Mark::box}, {"tracking lost", kLostColour, Mark::box}});
+      plot.legend({{"tracking poor", kPoorColour, Mark::box}, {"tracking lost", kLostColour, Mark::box}},
+                  panel.values);
   }
   return canvas;
 }

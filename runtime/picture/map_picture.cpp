@@ -36,15 +36,20 @@ Vec3 up_direction(const PlyMesh& mesh) {
   return up;
 }
 
+/// Range without the outermost two in a thousand: a lone speck is not to shrink the room.
+Range without_specks(std::vector<double> values) {
+  if (values.empty()) return {};
+  std::sort(values.begin(), values.end());
+  const std::size_t cut = values.size() / 500;
+  return {values[cut], values[values.size() - 1 - cut]};
+}
+
 Range spread(const PlyMesh& mesh, Vec3 direction) {
-  std::vector<float> values;
+  std::vector<double> values;
   const std::size_t stride = std::max<std::size_t>(1, mesh.vertices_m.size() / 200'000);
   for (std::size_t i = 0; i < mesh.vertices_m.size(); i += stride)
-    values.push_back(dot(direction, mesh.vertices_m[i]));
-  std::sort(values.begin(), values.end());
-  // Without the outermost two in a thousand: a lone speck is not to shrink the room.
-  const std::size_t cut = values.size() / 500;
-  return {static_cast<double>(values[cut]), static_cast<double>(values[values.size() - 1 - cut])};
+    values.push_back(static_cast<double>(dot(direction, mesh.vertices_m[i])));
+  return without_specks(std::move(values));
 }
 
 /// The room as a box along its own axes.
@@ -78,65 +83,74 @@ ViewPoint view_along(Vec3 right, Vec3 down, Vec3 into, Vec3 centre_map, float di
   return view;
 }
 
-ViewPoint from_above(const Room& room, double width_px, double height_px) {
-  ViewPoint view = view_along(room.right, -room.forward, -room.up, room.middle(), 0);
-  const double scale = std::min(width_px / std::max(room.along_right.span(), 0.1),
-                                height_px / std::max(room.along_forward.span(), 0.1));
-  view.scale_px = static_cast<float>(0.92 * scale);
-  return view;
+ViewPoint from_above(const Room& room) {
+  return view_along(room.right, -room.forward, -room.up, room.middle(), 0);
 }
 
-/// From behind the first camera, turned aside and looking down, at a distance that shows the whole room.
-ViewPoint from_behind(const Room& room, double width_px, double height_px) {
+/// From behind the first camera, turned aside and looking down, far enough to be outside of the room.
+ViewPoint from_behind(const Room& room) {
   const float aside = 0.5f, down = 0.75f;  // radians
   const Vec3 level = std::cos(aside) * room.forward + std::sin(aside) * room.right;
   const Vec3 into = normalized(std::cos(down) * level - std::sin(down) * room.up);
   const Vec3 right = normalized(std::cos(aside) * room.right - std::sin(aside) * room.forward);
-  const Vec3 down_axis = cross(into, right);
-  const double radius = 0.5 * std::sqrt(room.along_right.span() * room.along_right.span() +
-                                        room.along_up.span() * room.along_up.span() +
-                                        room.along_forward.span() * room.along_forward.span());
-  const double distance = std::max(2.6 * radius, 0.3);
-  ViewPoint view = view_along(right, down_axis, into, room.middle(), static_cast<float>(distance));
+  const double diagonal =
+      std::hypot(room.along_right.span(), room.along_up.span(), room.along_forward.span());
+  ViewPoint view =
+      view_along(right, cross(into, right), into, room.middle(), static_cast<float>(1.3 * diagonal + 0.3));
   view.perspective = true;
-  // The largest picture that holds the eight corners of the room.
-  double extent_x = 1e-6, extent_y = 1e-6;
-  view.scale_px = 1;
-  for (int corner = 0; corner < 8; ++corner) {
-    const auto end = [&](Range r, int bit) {
-      return static_cast<float>((corner >> bit & 1) != 0 ? r.high : r.low);
-    };
-    const Vec3 p = end(room.along_right, 0) * room.right + end(room.along_up, 1) * room.up +
-                   end(room.along_forward, 2) * room.forward;
-    if (const std::optional<Point> pixel = view.project(p)) {
-      extent_x = std::max(extent_x, std::abs(pixel->x));
-      extent_y = std::max(extent_y, std::abs(pixel->y));
-    }
-  }
-  view.scale_px = static_cast<float>(0.96 * std::min(0.5 * width_px / extent_x, 0.5 * height_px / extent_y));
   return view;
 }
 
-void draw_view(Canvas& canvas, const Rect& at, const PlyMesh& mesh, ViewPoint view, const RunInputs& inputs,
-               const std::function<bool(Vec3)>& keep) {
-  ViewPoint doubled = view;
-  doubled.scale_px *= 2;
-  canvas.image(halved(rasterise(mesh, doubled, 2 * kPanelWidth_px, 2 * kPanelHeight_px, kBackground, keep)),
-               at);
-  if (!inputs.estimate || !*inputs.estimate) return;
-  std::vector<Point> path;
+/// Scales and shifts the view so that the mesh, all but a few specks, and the path fill the panel.
+ViewPoint fitted(ViewPoint view, const PlyMesh& mesh, const std::vector<Vec3>& path) {
+  view.scale_px = 1;
+  view.offset_px = {};
+  std::vector<double> xs, ys;
+  const std::size_t stride = std::max<std::size_t>(1, mesh.vertices_m.size() / 100'000);
+  for (std::size_t i = 0; i < mesh.vertices_m.size(); i += stride)
+    if (const std::optional<Point> pixel = view.project(mesh.vertices_m[i])) {
+      xs.push_back(pixel->x);
+      ys.push_back(pixel->y);
+    }
+  Range x = without_specks(xs), y = without_specks(ys);
+  for (const Vec3& p : path)
+    if (const std::optional<Point> pixel = view.project(p)) {
+      x = {std::min(x.low, pixel->x), std::max(x.high, pixel->x)};
+      y = {std::min(y.low, pixel->y), std::max(y.high, pixel->y)};
+    }
+  const double scale =
+      0.94 * std::min(kPanelWidth_px / std::max(x.span(), 1e-3), kPanelHeight_px / std::max(y.span(), 1e-3));
+  view.scale_px = static_cast<float>(scale);
+  view.offset_px = {-0.5 * scale * (x.low + x.high), -0.5 * scale * (y.low + y.high)};
+  return view;
+}
+
+std::vector<Vec3> path_of(const RunInputs& inputs) {
+  std::vector<Vec3> path;
+  if (!inputs.estimate || !*inputs.estimate) return path;
   for (const TimedPose& pose : (*inputs.estimate)->poses) {
     const Vec3d t = pose.T_world_cam.translation;
-    const auto pixel =
-        view.project({static_cast<float>(t.x), static_cast<float>(t.y), static_cast<float>(t.z)});
-    if (pixel)
-      path.push_back({at.x + at.width / 2 + std::clamp(pixel->x, -1e5, 1e5),
-                      at.y + at.height / 2 + std::clamp(pixel->y, -1e5, 1e5)});
+    path.push_back({static_cast<float>(t.x), static_cast<float>(t.y), static_cast<float>(t.z)});
   }
+  return path;
+}
+
+void draw_view(Canvas& canvas, const Rect& at, const PlyMesh& mesh, const ViewPoint& view,
+               const std::vector<Vec3>& path, const std::function<bool(Vec3)>& keep) {
+  ViewPoint doubled = view;
+  doubled.scale_px *= 2;
+  doubled.offset_px = {2 * view.offset_px.x, 2 * view.offset_px.y};
+  canvas.image(halved(rasterise(mesh, doubled, 2 * kPanelWidth_px, 2 * kPanelHeight_px, kBackground, keep)),
+               at);
+  std::vector<Point> line;
+  for (const Vec3& p : path)
+    if (const std::optional<Point> pixel = view.project(p))
+      line.push_back({at.x + at.width / 2 + pixel->x, at.y + at.height / 2 + pixel->y});
+  if (line.empty()) return;
   canvas.clip(at);
-  canvas.line(path, {1, 1, 1, 0.9}, 4);
-  canvas.line(path, kEstimateColour, 2);
-  if (!path.empty()) canvas.dot(path.front(), 5, kAccent);
+  canvas.line(thinned(line), {1, 1, 1, 0.9}, 4);
+  canvas.line(thinned(line), kEstimateColour, 2);
+  canvas.dot(line.front(), 5, kAccent);
   canvas.unclip();
 }
 
@@ -169,10 +183,11 @@ Painted paint_map(const RunInputs& inputs) {
   const Rect right = {2 * kGap_px + kPanelWidth_px, kHead_px, kPanelWidth_px, kPanelHeight_px};
   canvas.text({left.x, kHead_px - 10}, "from above, without the topmost 15 % of the height", {15});
   canvas.text({right.x, kHead_px - 10}, "from behind the first camera; blue: path of the camera", {15});
-  const ViewPoint above = from_above(room, kPanelWidth_px, kPanelHeight_px);
-  draw_view(canvas, left, *mesh, above, inputs, [&](Vec3 p) { return dot(room.up, p) <= ceiling; });
+  const std::vector<Vec3> camera_path = path_of(inputs);
+  const ViewPoint above = fitted(from_above(room), *mesh, camera_path);
+  draw_view(canvas, left, *mesh, above, camera_path, [&](Vec3 p) { return dot(room.up, p) <= ceiling; });
   draw_scale_bar(canvas, left, static_cast<double>(above.scale_px));
-  draw_view(canvas, right, *mesh, from_behind(room, kPanelWidth_px, kPanelHeight_px), inputs, {});
+  draw_view(canvas, right, *mesh, fitted(from_behind(room), *mesh, camera_path), camera_path, {});
   return canvas;
 }
 

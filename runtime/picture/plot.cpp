@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include <fmt/format.h>
 
@@ -164,13 +165,26 @@ void Plot::draw_mark(const LegendItem& item, Point at) {
   canvas_.text({at.x + 34, at.y + 5}, item.name, {14});
 }
 
-void Plot::legend(const std::vector<LegendItem>& items) {
-  constexpr double kLine_px = 22;
+void Plot::legend(const std::vector<LegendItem>& items, const std::vector<Point>& avoid) {
+  constexpr double kLine_px = 22, kMargin_px = 8;
   double widest = 0;
   for (const LegendItem& item : items) widest = std::max(widest, canvas_.text_width(item.name, 14));
   const double width = 54 + widest;
   const double height = 10 + kLine_px * static_cast<double>(items.size());
-  const Rect box = {inner_.x + inner_.width - width - 8, inner_.y + 8, width, height};
+  const double left = inner_.x + kMargin_px, right = inner_.x + inner_.width - width - kMargin_px;
+  const double top = inner_.y + kMargin_px, bottom = inner_.y + inner_.height - height - kMargin_px;
+  const std::vector<Point> points = to_page(avoid);
+  Rect box;
+  std::ptrdiff_t fewest = PTRDIFF_MAX;
+  for (const Point corner :
+       {Point{right, top}, Point{left, top}, Point{right, bottom}, Point{left, bottom}}) {
+    const auto hidden = std::count_if(points.begin(), points.end(), [&](Point p) {
+      return p.x >= corner.x && p.x <= corner.x + width && p.y >= corner.y && p.y <= corner.y + height;
+    });
+    if (hidden >= fewest) continue;
+    fewest = hidden;
+    box = {corner.x, corner.y, width, height};
+  }
   canvas_.fill(box, {1, 1, 1, 0.85});
   canvas_.outline(box, kGrid, 1);
   Point at = {box.x + 10, box.y + 5 + kLine_px / 2};

@@ -54,8 +54,8 @@ class Plot {
   /// From bottom to top.
   void shade(Range x, Colour colour);
   void dot(Point value, double radius_px, Colour colour);
-  /// Inside, at the top right.
-  void legend(const std::vector<LegendItem>& items);
+  /// Inside, in the corner where it hides the fewest of the points `avoid` (in the units of the axes).
+  void legend(const std::vector<LegendItem>& items, const std::vector<Point>& avoid = {});
   /// In a row above the axes, where the title would stand.
   void legend_above(const std::vector<LegendItem>& items);
 

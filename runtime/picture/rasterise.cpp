@@ -119,7 +119,8 @@ std::optional<Point> ViewPoint::project(Vec3 p_map) const {
   const Vec3 p = T_view_map * p_map;
   if (perspective && p.z < near_m) return std::nullopt;
   const float factor = perspective ? scale_px / p.z : scale_px;
-  return Point{static_cast<double>(factor * p.x), static_cast<double>(factor * p.y)};
+  return Point{offset_px.x + static_cast<double>(factor * p.x),
+               offset_px.y + static_cast<double>(factor * p.y)};
 }
 
 Picture rasterise(const PlyMesh& mesh, const ViewPoint& view, int32_t width_px, int32_t height_px,

@@ -15,6 +15,7 @@ struct ViewPoint {
   Se3 T_view_map;
   bool perspective = false;
   float scale_px = 100;  ///< pixels a metre, or focal length in pixels when perspective
+  Point offset_px;       ///< from the middle of the picture
   float near_m = 0.05f;  ///< perspective: what is nearer is not drawn
 
   /// Pixel from the middle of the picture; nothing when it lies before `near_m` of a perspective view.

@@ -48,7 +48,9 @@ void draw_view(Canvas& canvas, const Rect& outer, std::vector<Point> Path::*view
   if (!(truth.*view).empty()) legend.push_back({"truth", kTruthColour});
   legend.push_back({"estimate", kEstimateColour});
   legend.push_back({"start", kAccent, Mark::dot});
-  plot.legend(legend);
+  std::vector<Point> drawn = estimate.*view;
+  drawn.insert(drawn.end(), (truth.*view).begin(), (truth.*view).end());
+  plot.legend(legend, drawn);
 }
 
 std::string title_of(const RunInputs& inputs) {
