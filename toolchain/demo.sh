@@ -10,9 +10,10 @@ cmake --build build/release --target stillmap
 stillmap=build/release/stillmap
 out=out/demo
 source=synthetic:crowd
-if [[ ! -f $out/report.json || $stillmap -nt $out/report.json ]]; then
+if [[ ! -f $out/demo-done || $stillmap -nt $out/demo-done ]]; then
   $stillmap run --source "$source" --out "$out"
   $stillmap picture "$out"
+  touch "$out/demo-done"
 fi
 
 echo
