@@ -43,7 +43,6 @@ void hold(Stance& person, Vec3 centre, Vec3 half, float box_yaw, float height_m,
 void no_movers(double, World&) {}
 
 // ---- static, loop, fast
-// ---------------------------------------------------------------------------------------
 
 Se3d static_camera(double t) {
   static const Sway sway = {{-1.30, 0.0, 1.35}, {0.20, 0.45, 0.10}, {6.7, 5.2, 4.4}, 0, 14, 6.1, -7, 5, 4.7};
@@ -68,7 +67,6 @@ Se3d fast_camera(double t) {
 }
 
 // ---- balloon
-// --------------------------------------------------------------------------------------------------
 
 constexpr float kBalloonM = 0.30f;
 
@@ -135,7 +133,6 @@ void balloon_tracking_movers(double t, World& world) {
 }
 
 // ---- crowds
-// ---------------------------------------------------------------------------------------------------
 
 Se3d crowd_camera(double t) {
   static const Sway sway = {{-1.42, 0.0, 1.36}, {0.08, 0.34, 0.06}, {6.3, 4.4, 4.9}, 0, 9, 5.3, -4, 2.5, 4.7};
@@ -165,11 +162,19 @@ void crowd_movers(double t, World& world) {
   }
 }
 
+/// Looks about, so that it maps new parts of the room while people stand before them.
+Se3d crowd_start_camera(double t) {
+  static const Sway sway = {
+      {-1.34, 0.0, 1.36}, {0.08, 0.34, 0.06}, {6.3, 4.4, 4.9}, 0, 26, 7.4, -4, 2.5, 4.7};
+  return sway_camera(sway, t);
+}
+
 void crowd_start_movers(double t, World& world) {
   for (int who = 0; who < 3; ++who) {
     // All stand still at first, then set off slowly one after the other.
     const auto path = [&](double s) {
-      return crowd_place(who, 0.4 + 2.1 * who + from_rest(std::max(0.0, s - 0.5 * who), 2.5));
+      const Spot2 nearer = {who == 0 ? -0.30 : -0.45, 0.0};
+      return nearer + crowd_place(who, 0.4 + 2.1 * who + from_rest(std::max(0.0, s - 0.5 * who), 4.0));
     };
     add_person(world, walk(path, t, kToCamera), static_cast<uint32_t>(3 + who));
   }
@@ -196,7 +201,6 @@ void crowd_close_movers(double t, World& world) {
 }
 
 // ---- boxes
-// ----------------------------------------------------------------------------------------------------
 
 /// A box that stands close before the camera when the scene begins, so that it is mapped. Somebody comes from
 /// behind it, and slowly moves it: hardest for whoever trusts the larger part of the picture.
@@ -232,11 +236,11 @@ void add_table(World& world, Spot2 at, float half_x, float half_y, float height_
           0.0f, {Pattern::planks, {70, 60, 52}, {130, 116, 100}, 0.10f, 7}, false);
 }
 
-constexpr Haul kMovingBox = {{0.16f, 0.44f, 0.38f}, 0.84f + 0.38f, 0.7, 3.4, 1};
-constexpr Spot2 kMovingBoxRest = {-0.28, 0.0};
+constexpr Haul kMovingBox = {{0.16f, 0.41f, 0.42f}, 0.80f + 0.42f, 0.6, 3.2, 1};
+constexpr Spot2 kMovingBoxRest = {-0.38, 0.0};
 
-void furnished_with_table(World& world) {
-  furnished_room(world);
+void bare_with_moving_table(World& world) {
+  bare_room(world);
   add_table(world, kMovingBoxRest, kMovingBox.half_m.x, kMovingBox.half_m.y,
             kMovingBox.rest_height_m - kMovingBox.half_m.z);
 }
@@ -248,8 +252,8 @@ Se3d moving_box_camera(double t) {
 
 void moving_box_movers(double t, World& world) {
   const auto place = [](double s) {
-    const double moved = from_rest(std::max(0.0, s - kMovingBox.moves_s), 3.0);
-    return kMovingBoxRest + Spot2{0.14 * (1.0 - std::cos(kTurn * moved / 7.9)), 0.42 * wave(moved, 8.6)};
+    const double moved = from_rest(std::max(0.0, s - kMovingBox.moves_s), 4.0);
+    return kMovingBoxRest + Spot2{0.07 * (1.0 - std::cos(kTurn * moved / 7.9)), 0.36 * wave(moved, 9.2)};
   };
   haul(kMovingBox, place, t, world);
 }
@@ -362,10 +366,10 @@ void removing_movers(double t, World& world) {
   carry_off(t, 0.8, 3.8, 10.6, 2, world);
 }
 
-constexpr Haul kKidnappedBox = {{0.18f, 0.38f, 0.32f}, 0.86f + 0.32f, 1.6, 4.4, 5};
-constexpr Spot2 kKidnappedRest = {-0.36, 0.0};
+constexpr Haul kKidnappedBox = {{0.16f, 0.40f, 0.40f}, 0.80f + 0.40f, 1.4, 4.4, 5};
+constexpr Spot2 kKidnappedRest = {-0.42, 0.0};
 
-void bare_with_table(World& world) {
+void bare_with_kidnapping_table(World& world) {
   bare_room(world);
   add_table(world, kKidnappedRest, kKidnappedBox.half_m.x, kKidnappedBox.half_m.y,
             kKidnappedBox.rest_height_m - kKidnappedBox.half_m.z);
@@ -374,11 +378,11 @@ void bare_with_table(World& world) {
 void kidnapping_movers(double t, World& world) {
   const auto place = [](double s) {
     static constexpr std::array<Waypoint, 6> way = {{{kKidnappedBox.moves_s, kKidnappedRest},
-                                                     {6.6, {-0.32, 0.22}},
-                                                     {8.2, {-0.18, 0.34}},
-                                                     {10.2, {0.10, -0.10}},
-                                                     {12.0, {-0.20, -0.62}},
-                                                     {13.6, {-0.60, -1.15}}}};
+                                                     {6.6, {-0.40, 0.16}},
+                                                     {8.4, {-0.36, 0.34}},
+                                                     {10.4, {-0.26, -0.10}},
+                                                     {12.2, {-0.36, -0.62}},
+                                                     {13.8, {-0.64, -1.18}}}};
     return along(way, s);
   };
   haul(kKidnappedBox, place, t, world);
@@ -418,7 +422,6 @@ void placing_obstructing_movers(double t, World& world) {
 }
 
 // ---- camera and people together
-// -------------------------------------------------------------------------------
 
 constexpr double kTourPeriod = 15.0;
 
@@ -480,16 +483,16 @@ const std::vector<Scene>& all_scenes() {
       {"balloon", 12, true, furnished_room, balloon_movers, balloon_camera},
       {"balloon_tracking", 12, true, furnished_room, balloon_tracking_movers, balloon_tracking_camera},
       {"crowd", 12, true, furnished_room, crowd_movers, crowd_camera},
-      {"crowd_start", 12, true, furnished_room, crowd_start_movers, crowd_camera},
+      {"crowd_start", 12, true, furnished_room, crowd_start_movers, crowd_start_camera},
       {"crowd_close", 12, true, bare_room, crowd_close_movers, crowd_close_camera},
-      {"moving_box", 12, true, furnished_with_table, moving_box_movers, moving_box_camera},
+      {"moving_box", 12, true, bare_with_moving_table, moving_box_movers, moving_box_camera},
       {"obstructing_box", 12, true, furnished_room, obstructing_movers, obstructing_camera},
       {"placing_box", 14, true, furnished_with_stand, placing_movers, stand_camera},
       {"removing_box", 13, true, furnished_with_stand, removing_movers, stand_camera},
       {"placing_obstructing_box", 12, true, furnished_room, placing_obstructing_movers, stand_camera},
       {"person_tracking", 14, true, furnished_room, person_tracking_movers, person_tracking_camera},
       {"synchronous", 12, true, bare_room, synchronous_movers, synchronous_camera},
-      {"kidnapping_box", 14, true, bare_with_table, kidnapping_movers, moving_box_camera},
+      {"kidnapping_box", 14, true, bare_with_kidnapping_table, kidnapping_movers, moving_box_camera},
       {"loop", 20, false, furnished_room, no_movers, loop_camera},
       {"fast", 10, false, furnished_room, no_movers, fast_camera}};
   return scenes;
