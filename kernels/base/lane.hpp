@@ -39,6 +39,13 @@ STILLMAP_HD int32_t to_int(float x) {
 STILLMAP_HD int32_t shift_right(int32_t x, int32_t bits) {
   return x >> bits;
 }
+/// Modulo 2^32, as hashes need it.
+STILLMAP_HD int32_t wrapping_add(int32_t a, int32_t b) {
+  return static_cast<int32_t>(static_cast<uint32_t>(a) + static_cast<uint32_t>(b));
+}
+STILLMAP_HD int32_t wrapping_multiply(int32_t a, int32_t b) {
+  return static_cast<int32_t>(static_cast<uint32_t>(a) * static_cast<uint32_t>(b));
+}
 STILLMAP_HD float gather_float(const float* base, int32_t index) {
   return base[index];
 }

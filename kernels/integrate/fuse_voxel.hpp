@@ -121,8 +121,8 @@ STILLMAP_HD VoxelState<F> fused(VoxelState<F> v, const Observation<F>& o, F luma
 /// eight bits do not bias the running mean.
 template <class I>
 STILLMAP_HD I dither_bits(I voxel, I frame) {
-  I h = (voxel + frame * I(0x3504f333)) * I(0x2c1b3c6d);
-  h = (h ^ shift_right(h, 15)) * I(0x297a2d39);
+  I h = wrapping_multiply(wrapping_add(voxel, wrapping_multiply(frame, I(0x3504f333))), I(0x2c1b3c6d));
+  h = wrapping_multiply(h ^ shift_right(h, 15), I(0x297a2d39));
   return shift_right(h ^ shift_right(h, 15), 8) & I(0xffff);
 }
 template <class F>

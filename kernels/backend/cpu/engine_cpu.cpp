@@ -373,7 +373,8 @@ IntegrateResult CpuEngine::integrate(const Se3& T_world_cam) {
                            {static_cast<float>(kSdfMax) / params_.map.truncation_m,
                             static_cast<float>(params_.integrate.weight_cap)},
                            params_.integrate.free_space,
-                           frames_++};
+                           frames_};
+  frames_ = (frames_ + 1) & 0xffff;
   const View<const VisibleBlock> blocks{memory_.visible.data, result.visible_blocks};
   pool_.for_each((blocks.size + kBlocksPerTile - 1) / kBlocksPerTile, [&](uint32_t tile) {
     const uint32_t first = tile * kBlocksPerTile;

@@ -2,6 +2,7 @@
 
 // Eight numbers side by side, by the compiler's vector types: two SSE or NEON registers, or one AVX register.
 
+#include <bit>
 #include <cstdint>
 #include <cstring>
 
@@ -34,6 +35,7 @@ STILLMAP_HD Mask8 operator!(Mask8 a) {
 
 struct Int8 {
   using Bits = Mask8::Bits;
+  using Unsigned = uint32_t __attribute__((vector_size(32)));
   Bits v;
 
   Int8() = default;
@@ -71,6 +73,14 @@ STILLMAP_HD Int8 operator<<(Int8 a, int32_t bits) {
 }
 STILLMAP_HD Int8 shift_right(Int8 a, int32_t bits) {
   return Int8(a.v >> bits);
+}
+STILLMAP_HD Int8 wrapping_add(Int8 a, Int8 b) {
+  return Int8(
+      std::bit_cast<Int8::Bits>(std::bit_cast<Int8::Unsigned>(a.v) + std::bit_cast<Int8::Unsigned>(b.v)));
+}
+STILLMAP_HD Int8 wrapping_multiply(Int8 a, Int8 b) {
+  return Int8(
+      std::bit_cast<Int8::Bits>(std::bit_cast<Int8::Unsigned>(a.v) * std::bit_cast<Int8::Unsigned>(b.v)));
 }
 STILLMAP_HD Mask8 operator==(Int8 a, Int8 b) {
   return {a.v == b.v};
