@@ -43,6 +43,8 @@ TEST(Lane, EightLanesEqualOneAtATime) {
       EXPECT_EQ(to_int(va)[i], to_int(a[i]));
       EXPECT_EQ(to_float(ia)[i], to_float(ia[i]));
       EXPECT_EQ((ia & ib)[i], ia[i] & ib[i]);
+      EXPECT_EQ(wrapping_add(ia << 17, ib << 17)[i], wrapping_add((ia << 17)[i], (ib << 17)[i]));
+      EXPECT_EQ(wrapping_multiply(ia << 8, ib)[i], wrapping_multiply((ia << 8)[i], ib[i]));
       EXPECT_EQ((ia | ib)[i], ia[i] | ib[i]);
       EXPECT_EQ((ia ^ ib)[i], ia[i] ^ ib[i]);
       EXPECT_EQ(shift_right(ia, 5)[i], shift_right(ia[i], 5));
