@@ -1,0 +1,286 @@
+#include "runtime/pipeline/pipeline.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+namespace stillmap {
+namespace {
+
+/// An engine that answers as told and writes down what it was asked.
+class ScriptedEngine : public Engine {
+ public:
+  PrepareResult prepare(const FrameView&) override {
+    calls += 'p';
+    return {prepare_status, 1000};
+  }
+  TrackResult track(const Se3& T_start) override {
+    calls += 't';
+    track_start = T_start;
+    return tracked;
+  }
+  MaskResult mask(const Se3& T) override {
+    calls += 'm';
+    mask_pose = T;
+    return {Status::ok, masked_pixels, masked_pixels};
+  }
+  TrackResult refine(const Se3& T_start) override {
+    calls += 'r';
+    refine_start = T_start;
+    return refined;
+  }
+  IntegrateResult integrate(const Se3& T) override {
+    calls += 'i';
+    integrate_pose = T;
+    return {};
+  }
+  Status raycast(const Se3&, const Intrinsics&, ImageView<float>, ImageView<Rgb8>) override {
+    return Status::ok;
+  }
+  Status extract_mesh(MeshSink&) override { return Status::ok; }
+  ImageView<const uint8_t> mask_image() const override { return {nullptr, 10, 20, 20}; }
+  ImageView<const float> depth_image_m() const override { return {}; }
+  ImageView<const Rgb8> colour_image() const override { return {}; }
+  MapHealth map_health() const override {
+    MapHealth health;
+    health.blocks = 77;
+    return health;
+  }
+  void reset_map() override {}
+
+  std::string calls;  ///< first letters, in order
+  Status prepare_status = Status::ok;
+  TrackResult tracked, refined;
+  int32_t masked_pixels = 0;
+  Se3 track_start, mask_pose, refine_start, integrate_pose;
+};
+
+Se3 at(float x, float y = 0) {
+  Se3 T;
+  T.translation = {x, y, 0};
+  return T;
+}
+
+class PipelineTest : public testing::Test {
+ protected:
+  /// Both registrations answer this pose and share of inliers.
+  void answer(const Se3& T, float inlier_ratio = 0.9f, Status status = Status::ok) {
+    engine_.tracked.status = engine_.refined.status = status;
+    engine_.tracked.T_world_cam = engine_.refined.T_world_cam = T;
+    engine_.tracked.inlier_ratio = engine_.refined.inlier_ratio = inlier_ratio;
+    engine_.tracked.converged = true;
+  }
+  FrameResult process(Pipeline& pipeline, int64_t stamp_ms) {
+    engine_.calls.clear();
+    RgbdFrame frame;
+    frame.depth_stamp = {stamp_ms * 1000000};
+    frame.sequence = static_cast<uint32_t>(stamp_ms);
+    return pipeline.process(frame);
+  }
+  ScriptedEngine engine_;
+  Config config_;
+};
+
+TEST_F(PipelineTest, TheFirstFrameIsTheMap) {
+  Pipeline pipeline(engine_, config_);
+  const FrameResult result = process(pipeline, 33);
+  EXPECT_EQ(engine_.calls, "pi");
+  EXPECT_EQ(result.status, Status::ok);
+  EXPECT_EQ(result.state, TrackingState::good);
+  EXPECT_EQ(norm(result.T_map_cam.translation), 0.0);
+  EXPECT_EQ(result.T_map_cam.rotation(0, 0), 1.0);
+  EXPECT_EQ(result.p_good, 1.0f);
+  EXPECT_EQ(result.stamp.ns, 33000000);
+  EXPECT_EQ(result.sequence, 33u);
+  EXPECT_EQ(result.map.blocks, 77u);
+  EXPECT_EQ(pipeline.counters().frames, 1u);
+}
+
+TEST_F(PipelineTest, TheInitialPoseIsThatOfTheFirstFrame) {
+  Pipeline pipeline(engine_, config_, exp(Twistd{{1, 2, 3}, {0, 0, 0.5}}));
+  EXPECT_NEAR(process(pipeline, 0).T_map_cam.translation.x, exp(Twistd{{1, 2, 3}, {0, 0, 0.5}}).translation.x,
+              1e-12);
+  EXPECT_NEAR(engine_.integrate_pose.rotation(1, 0), std::sin(0.5f), 1e-6f);
+  answer(at(1));
+  process(pipeline, 33);
+  EXPECT_NEAR(engine_.track_start.translation.z, 3.0f, 1e-5f);
+}
+
+TEST_F(PipelineTest, AFrameGoesThroughTheStepsOfThePaper) {
+  Pipeline pipeline(engine_, config_);
+  process(pipeline, 0);
+  answer(at(0.1f));
+  engine_.refined.T_world_cam = at(0.2f);
+  engine_.refined.covariance[0] = 3;
+  engine_.masked_pixels = 50;  // of 10 x 20
+  const FrameResult result = process(pipeline, 33);
+  EXPECT_EQ(engine_.calls, "ptmri");
+  EXPECT_EQ(engine_.mask_pose.translation.x, 0.1f);
+  EXPECT_EQ(engine_.refine_start.translation.x, 0.1f);
+  EXPECT_EQ(engine_.integrate_pose.translation.x, 0.2f);
+  EXPECT_NEAR(result.T_map_cam.translation.x, 0.2, 1e-6);
+  EXPECT_EQ(result.masked_fraction, 0.25f);
+  EXPECT_EQ(result.covariance[0], 3.0f);
+  EXPECT_EQ(result.inlier_ratio, 0.9f);
+  EXPECT_GT(result.p_good, 0.5f);
+  EXPECT_GE(result.ms.total_ms, 0.0f);
+}
+
+TEST_F(PipelineTest, WithoutAMaskAConvergedRegistrationIsNotRepeated) {
+  Pipeline pipeline(engine_, config_);
+  process(pipeline, 0);
+  answer(at(0.1f));
+  EXPECT_NEAR(process(pipeline, 33).T_map_cam.translation.x, 0.1, 1e-6);
+  EXPECT_EQ(engine_.calls, "ptmi");
+  engine_.tracked.converged = false;
+  process(pipeline, 66);
+  EXPECT_EQ(engine_.calls, "ptmri");
+}
+
+TEST_F(PipelineTest, ABadFrameIsCountedAndMovesNothing) {
+  Pipeline pipeline(engine_, config_);
+  engine_.prepare_status = Status::bad_data;
+  EXPECT_EQ(process(pipeline, 0).status, Status::bad_data);  // also as the first: the next is the map
+  EXPECT_EQ(engine_.calls, "p");
+  engine_.prepare_status = Status::ok;
+  process(pipeline, 33);
+  EXPECT_EQ(engine_.calls, "pi");
+  answer(at(0.1f));
+  process(pipeline, 66);
+  engine_.prepare_status = Status::bad_data;
+  const FrameResult bad = process(pipeline, 100);
+  EXPECT_EQ(engine_.calls, "p");
+  EXPECT_EQ(bad.status, Status::bad_data);
+  EXPECT_NEAR(bad.T_map_cam.translation.x, 0.1, 1e-6);
+  EXPECT_EQ(bad.state, TrackingState::good);
+  engine_.prepare_status = Status::ok;
+  process(pipeline, 133);
+  EXPECT_EQ(engine_.track_start.translation.x, 0.1f);
+  EXPECT_EQ(pipeline.counters().frames, 5u);
+  EXPECT_EQ(pipeline.counters().bad_frames, 2u);
+  EXPECT_EQ(pipeline.counters().lost_frames, 0u);
+}
+
+TEST_F(PipelineTest, APoorPoseFreezesTheMap) {
+  Pipeline pipeline(engine_, config_);
+  process(pipeline, 0);
+  answer(at(0.1f), 0.3f);  // between lost at 0.2 and poor at 0.4
+  const FrameResult result = process(pipeline, 33);
+  EXPECT_EQ(result.state, TrackingState::poor);
+  EXPECT_EQ(engine_.calls, "ptm");
+  EXPECT_NEAR(result.T_map_cam.translation.x, 0.1, 1e-6);  // the pose goes out all the same
+  EXPECT_GT(result.p_good, 0.0f);
+  EXPECT_LT(result.p_good, 0.5f);
+  EXPECT_EQ(pipeline.counters().lost_frames, 0u);
+}
+
+TEST_F(PipelineTest, LostIsSaidCountedAndComesBack) {
+  Pipeline pipeline(engine_, config_);
+  process(pipeline, 0);
+  answer(at(0.1f));
+  process(pipeline, 33);
+  answer(at(0.1f), 0.9f, Status::degenerate);
+  EXPECT_EQ(process(pipeline, 66).state, TrackingState::lost);
+  EXPECT_EQ(engine_.calls.find('i'), std::string::npos);
+  answer(at(0.5f), 0.1f);
+  const FrameResult lost = process(pipeline, 100);
+  EXPECT_EQ(lost.state, TrackingState::lost);
+  EXPECT_EQ(lost.p_good, 0.0f);
+  EXPECT_EQ(pipeline.counters().lost_frames, 2u);
+  EXPECT_EQ(pipeline.counters().relocalised, 0u);
+  engine_.prepare_status = Status::bad_data;
+  EXPECT_EQ(process(pipeline, 133).state, TrackingState::lost);  // a bad frame finds nothing again
+  EXPECT_EQ(pipeline.counters().lost_frames, 2u);
+  engine_.prepare_status = Status::ok;
+  answer(at(0.2f), 0.8f);
+  EXPECT_EQ(process(pipeline, 166).state, TrackingState::good);
+  EXPECT_EQ(pipeline.counters().relocalised, 1u);
+  process(pipeline, 200);
+  EXPECT_EQ(pipeline.counters().relocalised, 1u);
+}
+
+TEST_F(PipelineTest, ADegenerateFrameKeepsThePose) {
+  Pipeline pipeline(engine_, config_);
+  process(pipeline, 0);
+  answer(at(0.1f));
+  process(pipeline, 33);
+  answer(at(9), 0.9f, Status::degenerate);
+  EXPECT_NEAR(process(pipeline, 66).T_map_cam.translation.x, 0.1, 1e-6);
+}
+
+TEST_F(PipelineTest, StartsFromTheLastPoseUnlessAskedOtherwise) {
+  config_.track.prior = MotionPrior::last_pose;
+  Pipeline pipeline(engine_, config_);
+  process(pipeline, 0);
+  answer(at(0.1f));
+  process(pipeline, 33);
+  EXPECT_EQ(engine_.track_start.translation.x, 0.0f);
+  answer(at(0.2f));
+  process(pipeline, 66);
+  EXPECT_EQ(engine_.track_start.translation.x, 0.1f);
+}
+
+TEST_F(PipelineTest, ConstantVelocityContinuesTheLastMotionByTime) {
+  config_.track.prior = MotionPrior::constant_velocity;
+  Pipeline pipeline(engine_, config_);
+  process(pipeline, 0);
+  answer(at(0.1f));
+  process(pipeline, 40);
+  EXPECT_EQ(engine_.track_start.translation.x, 0.0f);  // one pose is no motion
+  answer(at(0.2f));
+  process(pipeline, 80);
+  EXPECT_NEAR(engine_.track_start.translation.x, 0.2f, 1e-6f);
+  answer(at(0.25f));
+  process(pipeline, 100);
+  EXPECT_NEAR(engine_.track_start.translation.x, 0.25f, 1e-6f);  // half the time
+  process(pipeline, 1100);
+  EXPECT_NEAR(engine_.track_start.translation.x, 0.35f, 1e-6f);  // a gap: twice the motion and no more
+}
+
+TEST_F(PipelineTest, ConstantVelocityTurnsWithTheCamera) {
+  config_.track.prior = MotionPrior::constant_velocity;
+  Pipeline pipeline(engine_, config_);
+  const Se3d step = exp(Twistd{{0.1, 0, 0}, {0, 0, 0.3}});
+  process(pipeline, 0);
+  answer(cast<float>(step));
+  process(pipeline, 40);
+  answer(cast<float>(step * step));
+  process(pipeline, 80);
+  process(pipeline, 120);
+  const Se3 expected = cast<float>(step * step * step);
+  EXPECT_LT(norm(engine_.track_start.translation - expected.translation), 1e-5f);
+  EXPECT_NEAR(engine_.track_start.rotation(1, 0), expected.rotation(1, 0), 1e-5f);
+}
+
+TEST_F(PipelineTest, NoMotionIsContinuedOverALossOrAStampThatJumpsBack) {
+  config_.track.prior = MotionPrior::constant_velocity;
+  Pipeline pipeline(engine_, config_);
+  process(pipeline, 1000);
+  answer(at(0.1f));
+  process(pipeline, 1040);
+  answer(at(0.2f));
+  process(pipeline, 1080);
+  process(pipeline, 500);
+  EXPECT_EQ(engine_.track_start.translation.x, 0.2f);
+  answer(at(0.3f), 0.0f);  // lost
+  process(pipeline, 540);
+  const float last_x = engine_.track_start.translation.x;
+  EXPECT_TRUE(std::isfinite(last_x));
+  answer(at(0.4f));
+  process(pipeline, 580);
+  const float from_lost_x = engine_.track_start.translation.x;
+  process(pipeline, 620);
+  EXPECT_EQ(engine_.track_start.translation.x, 0.4f);  // the way out of the loss is no motion
+  EXPECT_TRUE(std::isfinite(from_lost_x));
+}
+
+TEST_F(PipelineTest, StatesHaveNames) {
+  EXPECT_STREQ(to_string(TrackingState::good), "good");
+  EXPECT_STREQ(to_string(TrackingState::poor), "poor");
+  EXPECT_STREQ(to_string(TrackingState::lost), "lost");
+}
+
+}  // namespace
+}  // namespace stillmap
