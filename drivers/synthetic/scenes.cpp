@@ -1,6 +1,5 @@
 // The scenes, after the Bonn RGB-D Dynamic Dataset. The camera is most often in the west of the room and
-// looks east
-// (+x); people come from beside it. Where a person is near, the numbers keep 0.6 m to the lens.
+// looks east (+x); people come from beside it. Where somebody is near, the numbers keep 0.6 m to the lens.
 
 #include <algorithm>
 #include <array>
