@@ -32,7 +32,7 @@ Result<Config> read_config(const std::string& path, const std::vector<std::strin
   std::string problems;
   for (const std::string& setting : settings)
     if (const auto done = apply_setting(config, setting); !done)
-      problems += (problems.empty() ? "" : "\n  ") + ("--set " + setting + ": " + done.error());
+      problems += (problems.empty() ? "" : "\n  ") + done.error();
   if (!problems.empty()) return Error{problems, ErrorKind::bad_usage};
   return config;
 }

@@ -110,8 +110,8 @@ struct CpuMemory {
 
 class CpuEngine final : public Engine {
  public:
-  CpuEngine(const EngineParams& params, uint64_t bytes)
-      : params_(params), arena_(bytes), loops_(best_loops()), pool_(params.threads) {
+  CpuEngine(const EngineParams& params, const CpuLoops& loops, uint64_t bytes)
+      : params_(params), arena_(bytes), loops_(loops), pool_(params.threads) {
     if (arena_.failed()) return;
     memory_.carve(arena_, params_);
     memory_.map.clear();
@@ -336,20 +336,21 @@ Status CpuEngine::list_visible(const VisibleGroupPass& pass, uint32_t& visible_c
     for (uint32_t g = tile * kGroupsPerTile; g < end; ++g) memory_.groups[g] = loops_.visible_group(pass, g);
   });
   visible_count = 0;
-  for (uint32_t g = 0; g < count; ++g) {
-    const GroupView view = memory_.groups[g];
-    for (uint64_t bits = view.free | view.mixed; bits; bits &= bits - 1) {
-      const int32_t bit = __builtin_ctzll(bits);
-      const InsertResult block = memory_.map.insert(pack(pass.block_at(g, bit)));
-      if (block.block == kNoBlock) {
-        status = Status::capacity_exhausted;
-        continue;
-      }
-      const bool free = view.free >> bit & 1;
-      if (free && pass.map.settled_free[block.block]) continue;
+  const auto add = [&](uint32_t group, int32_t bit, bool free) {
+    const InsertResult block = memory_.map.insert(pack(pass.block_at(group, bit)));
+    if (block.block == kNoBlock) {
+      status = Status::capacity_exhausted;
+    } else if (!free || !pass.map.settled_free[block.block]) {
       memory_.visible[visible_count++] = {block.block | (free ? VisibleBlock::kFree : 0u)};
     }
-  }
+  };
+  // Surfaces before free space: when the pool runs out, tracking needs the surfaces.
+  for (const bool free : {false, true})
+    for (uint32_t g = 0; g < count; ++g) {
+      const GroupView view = memory_.groups[g];
+      for (uint64_t bits = free ? view.free : view.mixed; bits; bits &= bits - 1)
+        add(g, __builtin_ctzll(bits), free);
+    }
   return status;
 }
 
@@ -394,8 +395,12 @@ MemoryItems plan_cpu_engine(const EngineParams& params) {
 }
 
 std::unique_ptr<Engine> make_cpu_engine(const EngineParams& params) {
+  return make_cpu_engine(params, best_loops());
+}
+
+std::unique_ptr<Engine> make_cpu_engine(const EngineParams& params, const CpuLoops& loops) {
   const uint64_t bytes = plan_cpu_engine(params).total_bytes;
-  std::unique_ptr<CpuEngine> engine(new (std::nothrow) CpuEngine(params, bytes));
+  std::unique_ptr<CpuEngine> engine(new (std::nothrow) CpuEngine(params, loops, bytes));
   if (!engine || engine->failed()) return nullptr;
   return engine;
 }
