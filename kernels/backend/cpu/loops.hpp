@@ -4,7 +4,9 @@
 // made.
 
 #include <cstdint>
+#include <memory>
 
+#include "kernels/engine.hpp"
 #include "kernels/integrate/depth_range.hpp"
 #include "kernels/integrate/integrate_pass.hpp"
 #include "kernels/integrate/visible_blocks.hpp"
@@ -34,5 +36,8 @@ extern const CpuLoops kLoopsAvx2;
 /// Best table for this machine; STILLMAP_ISA=baseline in the environment asks for the plain one.  @thread
 /// boot
 const CpuLoops& best_loops();
+
+/// make_cpu_engine with a given table, which the machine must be able to run.  @thread boot
+std::unique_ptr<Engine> make_cpu_engine(const EngineParams& params, const CpuLoops& loops);
 
 }  // namespace stillmap

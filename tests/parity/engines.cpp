@@ -1,0 +1,27 @@
+#include "tests/parity/engines.hpp"
+
+#include "kernels/backend/cpu/loops.hpp"
+
+namespace stillmap::parity {
+namespace {
+
+NamedEngine cpu(const std::string& name, const Tolerance& tolerance, const CpuLoops& loops, int32_t threads) {
+  return {name, tolerance, [&loops, threads](EngineParams params) {
+            params.threads = threads;
+            return make_cpu_engine(params, loops);
+          }};
+}
+
+}  // namespace
+
+std::vector<NamedEngine> available_engines() {
+  std::vector<NamedEngine> engines = {
+      cpu("cpu-baseline", kSameBits, kLoopsBaseline, 1),
+      cpu("cpu-baseline-3-threads", kSameBits, kLoopsBaseline, 3),
+  };
+  const CpuLoops& best = best_loops();
+  if (&best != &kLoopsBaseline) engines.push_back(cpu(std::string("cpu-") + best.name, kRounding, best, 2));
+  return engines;
+}
+
+}  // namespace stillmap::parity
