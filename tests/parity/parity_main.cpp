@@ -54,8 +54,8 @@ int run(int frames) {
 int main(int argc, char** argv) {
   int frames = stillmap::parity::kFrames;
   if (argc == 3 && std::strcmp(argv[1], "--frames") == 0) frames = std::atoi(argv[2]);
-  if ((argc != 1 && argc != 3) || frames < 2 || frames > 300) {
-    std::fprintf(stderr, "usage: stillmap_parity [--frames 2..300]\n");
+  if ((argc != 1 && argc != 3) || frames < 12 || frames > 300) {
+    std::fprintf(stderr, "usage: stillmap_parity [--frames 12..300]\n");
     return 2;
   }
   return stillmap::parity::run(frames);
