@@ -150,9 +150,9 @@ TEST(Fused, MeansConvergeWithoutBias) {
   constexpr float kLuma = 117.37f * 256, kCb = 131.4f, kCr = 97.63f, kSdfM = -0.01234f;
   std::mt19937 random(21);
   std::normal_distribution<float> noise(0, 3.0f), depth_noise(0, 0.004f);
-  double luma = 0, cb = 0, cr = 0, sdf_m = 0;
+  double luma = 0, cb = 0, cr = 0, sdf_m = 0, cb_square = 0;
   for (int32_t voxel = 0; voxel < kVoxels; ++voxel) {
-    VoxelState<float> v = kUnobserved;
+    VoxelState<float> v = {20000, 30000, 64, 64, 100, 120};  // something else was there before
     for (int32_t frame = 0; frame < 1000; ++frame)
       v = fused(v, band_at(kSdfM + depth_noise(random)), std::round(kLuma + 256 * noise(random)),
                 std::round(kCb + noise(random)), std::round(kCr + noise(random)), kWeights,
@@ -160,12 +160,14 @@ TEST(Fused, MeansConvergeWithoutBias) {
     luma += static_cast<double>(v.luma) / 256 / kVoxels;
     cb += static_cast<double>(v.cb) / kVoxels;
     cr += static_cast<double>(v.cr) / kVoxels;
+    cb_square += static_cast<double>((v.cb - kCb) * (v.cb - kCb)) / kVoxels;
     sdf_m += static_cast<double>(v.sdf / kWeights.units_per_m) / kVoxels;
   }
   EXPECT_NEAR(luma, static_cast<double>(kLuma) / 256, 0.1);
   EXPECT_NEAR(cb, static_cast<double>(kCb), 0.3);
   EXPECT_NEAR(cr, static_cast<double>(kCr), 0.3);
   EXPECT_NEAR(sdf_m, static_cast<double>(kSdfM), 1e-4);
+  EXPECT_LT(std::sqrt(cb_square), 6.0);  // rounding up or down by chance is noise, but stays bounded
 }
 
 TEST(Fused, DitherIsEvenlySpreadOverFramesAndVoxels) {

@@ -376,12 +376,12 @@ struct Script {
   double step_m = 0.01;
   std::vector<Se3> asked = {};
 
-  TrackResult run(const TrackParams& params, int32_t min_points = 10) {
+  TrackResult run(const TrackParams& params, const Se3& T_start = {}, int32_t min_points = 10) {
     const PassRunner runner{[](void* context, const Se3& T_map_cam, int32_t) {
                               return static_cast<Script*>(context)->answer(T_map_cam);
                             },
                             this};
-    return register_frame(runner, {}, params, min_points);
+    return register_frame(runner, T_start, params, min_points);
   }
   NormalEq answer(const Se3& T_map_cam) {
     const size_t call = asked.size();
@@ -396,6 +396,7 @@ struct Script {
     sums.sum[kPoints] = points.empty() ? 1000 : points.at(call);
     sums.sum[kCost] = mean_cost.at(call) * sums.sum[kPoints];
     sums.sum[kInliers] = sums.sum[kConsidered] = sums.sum[kPoints];
+    sums.sum[kSumSdf2] = 4 * sums.sum[kInliers];
     return sums;
   }
 };
@@ -454,6 +455,30 @@ TEST(RegisterFrame, NothingThatIsNotANumberIsTaken) {
   const TrackResult result = bad_step.run(one_level(1));
   EXPECT_EQ(result.iterations, 0);
   expect_same_pose(result.T_world_cam, {});
+}
+
+// About the camera centre c the covariance is 4 times the identity here. About the origin the same motion has
+// v = v_c + c x w: far from it a little turn is a long way.
+TEST(RegisterFrame, CovarianceIsAboutTheOriginOfTheMap) {
+  Se3 T_start;
+  T_start.translation = {1, 2, 3};
+  Script script{{1.0}};
+  const TrackResult result = script.run(one_level(0), T_start);
+  EXPECT_NEAR(result.rmse_m, 2.0f, 1e-6f);
+  const double c[3] = {1, 2, 3};
+  const double cross_c[3][3] = {{0, -c[2], c[1]}, {c[2], 0, -c[0]}, {-c[1], c[0], 0}};
+  double expected[6][6] = {};
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      expected[i][j] = 4 * (i == j);
+      for (int k = 0; k < 3; ++k) expected[i][j] += 4 * cross_c[i][k] * cross_c[j][k];
+      expected[i][3 + j] = 4 * cross_c[i][j];
+      expected[3 + i][3 + j] = 4 * (i == j);
+    }
+  int k = 0;
+  for (int i = 0; i < 6; ++i)
+    for (int j = i; j < 6; ++j, ++k)
+      EXPECT_NEAR(static_cast<double>(result.covariance[k]), expected[i][j], 1e-5) << i << " " << j;
 }
 
 TEST(RegisterFrame, ASmallStepEndsALevel) {
