@@ -8,7 +8,8 @@
 
 #include "config/read_file.hpp"
 
-namespace stillmap::inline dataset_text {
+namespace stillmap {
+inline namespace dataset_text {
 namespace {
 
 constexpr uint64_t kMaxTextBytes = 64 << 20;
@@ -127,4 +128,5 @@ std::vector<TextLine> TextFile::lines() const {
   return lines;
 }
 
-}  // namespace stillmap::inline dataset_text
+}  // namespace dataset_text
+}  // namespace stillmap

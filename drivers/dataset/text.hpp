@@ -10,7 +10,8 @@
 #include "config/result.hpp"
 #include "runtime/ports/frame_source.hpp"
 
-namespace stillmap::inline dataset_text {
+namespace stillmap {
+inline namespace dataset_text {
 
 /// Words of a line, separated by blanks, tabs or commas; none for a comment ('#').
 std::vector<std::string_view> words_of(std::string_view line);
@@ -44,4 +45,5 @@ class TextFile {
   std::string path_, content_;
 };
 
-}  // namespace stillmap::inline dataset_text
+}  // namespace dataset_text
+}  // namespace stillmap
