@@ -222,7 +222,9 @@ TrackResult CpuEngine::register_to_map(const Se3& T_start, bool masked) {
   } context{this, track_pass(T_start)};
   context.pass.use_mask = masked;
   const PassRunner runner{[](void* opaque, const Se3& T_map_cam, int32_t step) {
-                            auto& [engine, pass] = *static_cast<Context*>(opaque);
+                            Context& c = *static_cast<Context*>(opaque);
+                            CpuEngine* const engine = c.engine;
+                            TrackPass& pass = c.pass;
                             pass.T_map_cam = T_map_cam;
                             const int32_t rows = engine->k().height;
                             const uint32_t tiles = tiles_of(rows, kRowsPerTile);
