@@ -252,7 +252,8 @@ Se3d moving_box_camera(double t) {
 void moving_box_movers(double t, World& world) {
   const auto place = [](double s) {
     const double moved = from_rest(std::max(0.0, s - kMovingBox.moves_s), 4.0);
-    return kMovingBoxRest + Spot2{0.07 * (1.0 - std::cos(kTurn * moved / 7.9)), 0.36 * wave(moved, 9.2)};
+    // Mostly to and fro along the line of sight: hardest to tell from a camera that moves.
+    return kMovingBoxRest + Spot2{0.10 * (1.0 - std::cos(kTurn * moved / 6.5)), 0.08 * wave(moved, 9.2)};
   };
   haul(kMovingBox, place, t, world);
 }

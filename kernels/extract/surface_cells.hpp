@@ -56,7 +56,8 @@ STILLMAP_HD int32_t neighbour_of(int32_t coordinate) {
 
 }  // namespace cells_detail
 
-/// Reads block `block` and the voxels around it; absent blocks are unobserved.
+/// Reads block `block` and the voxels around it; absent blocks, and voxels seen less than map.mesh_min_weight
+/// times, are unobserved.
 STILLMAP_HD void read_rows(const VolumeView& map, Int3 block, VoxelRows& rows) {
   const VoxelBlock* around[27];
   for (int32_t i = 0; i < 27; ++i) {

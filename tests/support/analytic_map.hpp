@@ -39,6 +39,13 @@ class AnalyticMap {
     view_.truncation_m = truncation_m;
   }
 
+  /// One voxel seen once, at this distance.
+  void observe(Int3 at, int32_t voxel, int16_t sdf) {
+    VoxelBlock& out = *block(at);
+    out.surface[voxel].sdf = sdf;
+    out.record[voxel].weight = 1;
+  }
+
   /// From now on blocks get ids in this random order.
   void shuffle_ids(uint32_t seed) {
     std::mt19937 random(seed);

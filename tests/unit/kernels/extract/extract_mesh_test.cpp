@@ -188,8 +188,8 @@ TEST(ExtractMesh, RandomVoxelsStayManifold) {
   for (int z = 0; z < 3; ++z)
     for (int y = 0; y < 3; ++y)
       for (int x = 0; x < 3; ++x)
-        for (VoxelSurface& v : map.block({x - 1, y - 1, z - 1})->surface)
-          v.sdf = static_cast<int16_t>(near(random));
+        for (int i = 0; i < kBlockVoxels; ++i)
+          map.observe({x - 1, y - 1, z - 1}, i, static_cast<int16_t>(near(random)));
   MeshRecorder mesh;
   ASSERT_EQ(extract(map, mesh), Status::ok);
   check_form(mesh);

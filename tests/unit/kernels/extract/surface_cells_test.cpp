@@ -84,12 +84,13 @@ TEST(SurfaceCells, FollowTheRulesOnRandomVoxels) {
       for (int dy = -1; dy <= 1; ++dy)
         for (int dx = -1; dx <= 1; ++dx) {
           if (round > 3 && percent(random) < 20) continue;  // absent block
-          for (VoxelSurface& v : map.block(centre + Int3{dx, dy, dz})->surface) {
+          for (int i = 0; i < kBlockVoxels; ++i) {
             const int what = percent(random);
             if (what < round) continue;  // unobserved
-            v.sdf = what < 3 * round   ? kSdfMax
-                    : what < 4 * round ? static_cast<int16_t>(-kSdfMax)
-                                       : static_cast<int16_t>(near(random));
+            map.observe(centre + Int3{dx, dy, dz}, i,
+                        what < 3 * round   ? kSdfMax
+                        : what < 4 * round ? static_cast<int16_t>(-kSdfMax)
+                                           : static_cast<int16_t>(near(random)));
           }
         }
     compare_with_rules(map, centre);
@@ -110,6 +111,31 @@ TEST(SurfaceCells, FreeBesideUnseenInsideIsNoSurface) {
   find_cells(rows, cells);
   for (const auto& plane : cells.active)
     for (const uint16_t row : plane) EXPECT_EQ(row, 0);
+}
+
+TEST(SurfaceCells, VoxelsSeenTooSeldomDoNotCount) {
+  AnalyticMap map(8);
+  map.fill({0, 0, 0}, {1, 1, 1}, [](Vec3d p) {
+    AnalyticSample s;
+    s.sdf_m = p.x - 0.043;
+    return s;
+  });
+  for (VoxelRecord& r : map.block({0, 0, 0})->record) r.weight = 3;
+  VolumeView view = map.view();
+  const auto active_cells = [&] {
+    VoxelRows rows;
+    CellRows cells;
+    read_rows(view, {0, 0, 0}, rows);
+    find_cells(rows, cells);
+    uint32_t count = 0;
+    for (const auto& plane : cells.active)
+      for (const uint16_t row : plane) count += count_bits(row);
+    return count;
+  };
+  view.mesh_min_weight = 3;
+  EXPECT_EQ(active_cells(), 49u);  // 7x7 cells lie across the plane, all corners in this block
+  view.mesh_min_weight = 4;
+  EXPECT_EQ(active_cells(), 0u);
 }
 
 TEST(CountBits, Counts) {
