@@ -23,9 +23,9 @@ void mark_stamps_that_do_not_rise(std::vector<FrameEntry>& entries) {
   const FrameEntry* last = nullptr;
   for (size_t i = 0; i < usable.size(); ++i) {
     FrameEntry& entry = *usable[i];
-    const std::string what = entry.depth_path + ": stamp " + stamp_text(entry.depth_stamp);
+    const std::string what = entry.depth_path + ": stamp " + stamp_label(entry.depth_stamp);
     if (last && entry.depth_stamp <= last->depth_stamp) {
-      entry.problem = what + " jumps back: expected more than " + stamp_text(last->depth_stamp);
+      entry.problem = what + " jumps back: expected more than " + stamp_label(last->depth_stamp);
       continue;
     }
     const Stamp before = last ? last->depth_stamp : Stamp{std::numeric_limits<int64_t>::min()};

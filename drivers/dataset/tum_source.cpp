@@ -196,7 +196,7 @@ Result<std::vector<FrameEntry>> paired_frames(const fs::path& dir, const Lists& 
   if (pairs.empty())
     return cannot_open(dir.string() + ": none of " + std::to_string(lists.depth.size()) + " depth and " +
                        std::to_string(lists.colour.size()) + " colour images lie within " +
-                       stamp_text(Stamp{ns_of_ms(options.max_pair_ms)}) +
+                       stamp_label(Stamp{ns_of_ms(options.max_pair_ms)}) +
                        " s of each other; see --time-offset-ms");
   std::vector<FrameEntry> entries = lists.unusable;
   for (const auto& [depth, colour] : pairs)

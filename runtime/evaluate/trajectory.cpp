@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -19,54 +18,6 @@ constexpr uintmax_t kMaxFileBytes = uintmax_t{1} << 30;
 constexpr double kMaxPosition_m = 1e7;
 constexpr std::size_t kColumns = 8;
 constexpr double kMinQuaternionNorm = 1e-6;
-
-bool is_digit(char c) {
-  return c >= '0' && c <= '9';
-}
-
-/// A decimal number taken apart: 0.DIGITS * 10^point.
-struct Decimal {
-  bool negative = false;
-  std::string digits;  ///< without leading zeros
-  int64_t point = 0;
-};
-
-/// Power of ten after an `e`; saturates far outside of any use.
-std::optional<int64_t> parse_exponent(std::string_view text) {
-  if (!text.empty() && text.front() == '+') text.remove_prefix(1);
-  int64_t exponent = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), exponent);
-  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
-  return std::clamp<int64_t>(exponent, -10000, 10000);
-}
-
-std::optional<Decimal> parse_decimal(std::string_view text) {
-  Decimal d;
-  if (!text.empty() && (text.front() == '-' || text.front() == '+')) {
-    d.negative = text.front() == '-';
-    text.remove_prefix(1);
-  }
-  bool any_digit = false, after_point = false;
-  std::size_t i = 0;
-  for (; i < text.size() && (is_digit(text[i]) || (text[i] == '.' && !after_point)); ++i) {
-    if (text[i] == '.') {
-      after_point = true;
-      continue;
-    }
-    any_digit = true;
-    const bool significant = text[i] != '0' || !d.digits.empty();
-    if (significant) d.digits.push_back(text[i]);
-    if (!after_point && significant) ++d.point;
-    if (after_point && !significant) --d.point;
-  }
-  if (!any_digit) return std::nullopt;
-  if (i == text.size()) return d;
-  if (text[i] != 'e' && text[i] != 'E') return std::nullopt;
-  const std::optional<int64_t> exponent = parse_exponent(text.substr(i + 1));
-  if (!exponent) return std::nullopt;
-  d.point += *exponent;
-  return d;
-}
 
 /// Next column of `line`, which loses it; empty at the end.
 std::string_view take_column(std::string_view& line) {
@@ -100,7 +51,7 @@ Result<TimedPose> parse_line(std::string_view line) {
   if (count != kColumns)
     return Error{fmt::format("has {} columns; expected 8: stamp tx ty tz qx qy qz qw", count)};
   const std::optional<Stamp> stamp = parse_stamp(columns[0]);
-  if (!stamp) return Error{fmt::format("stamp '{}' is no number of seconds within +-9.2e9", columns[0])};
+  if (!stamp) return Error{fmt::format("stamp '{}' is no number of seconds within 100 years", columns[0])};
   std::array<double, 7> values{};
   for (std::size_t i = 0; i < values.size(); ++i) {
     const std::optional<double> value = parse_number(columns[i + 1]);
@@ -127,25 +78,6 @@ void sort_and_merge(Trajectory& trajectory) {
 
 }  // namespace
 
-std::optional<Stamp> parse_stamp(std::string_view text) {
-  const std::optional<Decimal> decimal = parse_decimal(text);
-  if (!decimal) return std::nullopt;
-  if (decimal->digits.empty()) return Stamp{0};
-  const int64_t digits_ns = decimal->point + 9;  // digits before the point of the number in nanoseconds
-  if (digits_ns > 19) return std::nullopt;
-  if (digits_ns < 0) return Stamp{0};
-  std::string whole = decimal->digits.substr(0, static_cast<std::size_t>(digits_ns));
-  whole.resize(static_cast<std::size_t>(digits_ns), '0');
-  uint64_t ns = 0;
-  for (const char c : whole) ns = ns * 10 + static_cast<uint64_t>(c - '0');
-  const std::size_t next = static_cast<std::size_t>(digits_ns);
-  if (next < decimal->digits.size() && decimal->digits[next] >= '5') ++ns;
-  constexpr uint64_t kLimit_ns = 9'200'000'000'000'000'000;
-  if (ns > kLimit_ns) return std::nullopt;
-  const int64_t magnitude = static_cast<int64_t>(ns);
-  return Stamp{decimal->negative ? -magnitude : magnitude};
-}
-
 double exact_seconds(Stamp stamp) {
   // By way of the text: dividing in any wider type rounds twice and misses now and then.
   return parse_number(stamp_text(stamp)).value_or(0);
@@ -154,14 +86,6 @@ double exact_seconds(Stamp stamp) {
 std::string stamp_text(Stamp stamp) {
   const uint64_t ns = static_cast<uint64_t>(stamp.ns < 0 ? -stamp.ns : stamp.ns);
   return fmt::format("{}{}.{:09}", stamp.ns < 0 ? "-" : "", ns / 1'000'000'000, ns % 1'000'000'000);
-}
-
-std::optional<double> parse_number(std::string_view text) {
-  if (text.size() > 1 && text.front() == '+' && text[1] != '-') text.remove_prefix(1);
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
-  return value;
 }
 
 Result<Trajectory> read_trajectory(const std::string& path) {

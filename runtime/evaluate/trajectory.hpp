@@ -10,6 +10,7 @@
 
 #include "config/result.hpp"
 #include "kernels/base/se3.hpp"
+#include "runtime/core/number_text.hpp"
 #include "runtime/ports/frame_source.hpp"
 
 namespace stillmap {
@@ -24,19 +25,11 @@ struct Trajectory {
   uint64_t repeated_stamps = 0;  ///< lines that gave way to a later line with the same stamp
 };
 
-/// Exact nanoseconds of a decimal number of seconds ("1305031229.4331", "1.305e9"); digits below 1 ns are
-/// rounded.
-/// @return nothing when the text is no number or lies beyond +-9.2e9 s.   test: trajectory_test
-std::optional<Stamp> parse_stamp(std::string_view text);
-
 /// The stamp as the nearest double: what a script sees that reads the text. (Stamp::seconds rounds twice.)
 double exact_seconds(Stamp stamp);
 
 /// Seconds with nine decimals, exactly.
 std::string stamp_text(Stamp stamp);
-
-/// A finite number, the whole of `text`; nothing otherwise.
-std::optional<double> parse_number(std::string_view text);
 
 /// Reads a trajectory. Columns are parted by spaces, tabs or commas; `#` starts a comment; quaternions of any
 /// length above 0 are normalised; lines may come in any order.
