@@ -9,10 +9,10 @@
 
 namespace stillmap {
 
-/// Square erosion: a pixel stays when every pixel within `radius_px` rows and columns is set; outside counts
-/// as set.
-/// @param scratch same size as `mask`; all three may not overlap except that the result is written to `mask`
-/// Rows [first, last) of the first pass; columns of the second.            test: mask_test
+/// Square erosion, rows first and columns of the result after: a pixel stays when every pixel within
+/// `radius_px` rows and columns is set; outside counts as set. Each call does the rows or columns [first,
+/// last).
+/// @param out same size as `in`, not the same memory                       test: mask_test
 void erode_rows(ImageView<const uint8_t> in, ImageView<uint8_t> out, int32_t radius_px, int32_t first_row,
                 int32_t last_row);
 void erode_columns(ImageView<const uint8_t> in, ImageView<uint8_t> out, int32_t radius_px, int32_t first_col,
