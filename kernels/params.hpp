@@ -11,6 +11,8 @@ namespace stillmap {
 /// What a switch with names can say; the names are in `kNames` in the same order.
 enum class InvalidDepth : uint8_t { ignore, complete };
 enum class MotionPrior : uint8_t { last_pose, constant_velocity };
+enum class RobustKernel : uint8_t { huber, geman_mcclure };
+enum class MaskMethod : uint8_t { residual, parts };
 
 /// Depth image to metres, paper III-E.
 struct DepthParams {
@@ -19,6 +21,8 @@ struct DepthParams {
   InvalidDepth invalid = InvalidDepth::ignore;
   int32_t complete_frames = 10;
   int32_t min_valid_pixels = 3000;
+  float noise_m = 0.001f;
+  float noise_per_m2 = 0.0015f;
 
   template <class F>
   static void fields(F&& f) {
@@ -32,13 +36,23 @@ struct DepthParams {
       "frames of the temporary model");
     f("min_valid_pixels", &P::min_valid_pixels, 10, 1e7, "pixels of 640x480", "ours",
       "with fewer (scaled to the image size) a frame neither moves the pose nor touches the map");
+    f("noise_m", &P::noise_m, 0, 0.1, "m", "ours", "standard deviation of a measurement close by");
+    f("noise_per_m2", &P::noise_per_m2, 0, 0.1, "1/m", "ours", "and its growth with the square of the depth");
   }
 };
 
 /// Registration, paper III-B. Used by the first registration and, with the mask, by the second.
 struct TrackParams {
   float colour_weight = 0.025f;
+  RobustKernel kernel = RobustKernel::geman_mcclure;
   float huber_depth_m = 0.02f;
+  float kernel_coarse_m = 0.06f;
+  float kernel_middle_m = 0.03f;
+  float kernel_fine_m = 0.015f;
+  float kernel_sigmas = 2.0f;
+  float trust_noise_m = 0.01f;
+  float trust_area_m = 2.5f;
+  int32_t first_finest_level = 1;
   int32_t levels = 3;
   int32_t iterations_coarse = 6;
   int32_t iterations_middle = 3;
@@ -48,7 +62,7 @@ struct TrackParams {
   float damping_down = 0.1f;
   float converged_m = 1e-4f;
   float converged_rad = 1e-4f;
-  MotionPrior prior = MotionPrior::last_pose;
+  MotionPrior prior = MotionPrior::constant_velocity;
   float lost_inlier_ratio = 0.2f;
   float poor_inlier_ratio = 0.4f;
   float inlier_m = 0.03f;
@@ -60,6 +74,21 @@ struct TrackParams {
       "w_c, weight of the intensity error (0..1 scale)");
     f("huber_depth_m", &P::huber_depth_m, 0, 1.0, "m", "ours",
       "Huber threshold on the depth residual; 0: squared error everywhere");
+    f("kernel", &P::kernel, 0, 1, "huber|geman_mcclure", "ours",
+      "huber: of the depth residual, scale huber_depth_m; geman_mcclure: of depth and intensity together, "
+      "what does not fit has no pull");
+    f("kernel_coarse_m", &P::kernel_coarse_m, 1e-3, 1.0, "m", "ours",
+      "scale of geman_mcclure at the coarsest level, without noise");
+    f("kernel_middle_m", &P::kernel_middle_m, 1e-3, 1.0, "m", "ours", "see kernel_coarse_m");
+    f("kernel_fine_m", &P::kernel_fine_m, 1e-3, 1.0, "m", "ours", "see kernel_coarse_m");
+    f("kernel_sigmas", &P::kernel_sigmas, 0, 10.0, "1", "ours",
+      "and this many standard deviations of the depth are added to the scale");
+    f("trust_noise_m", &P::trust_noise_m, 0, 1.0, "m", "ours",
+      "a point weighs s^2 / (s^2 + noise^2); 0: noise changes no weight");
+    f("trust_area_m", &P::trust_area_m, 0, 20.0, "m", "ours",
+      "nearer points weigh less, with the square of their depth, as the area that they cover; 0: off");
+    f("first_finest_level", &P::first_finest_level, 0, 2, "level", "ours",
+      "where the first registration ends: 0 every pixel, 1 every 2nd; the second one goes to 0");
     f("levels", &P::levels, 1, 3, "levels", "III-B", "coarse-to-fine sub-samplings, finest is every pixel");
     f("iterations_coarse", &P::iterations_coarse, 0, 100, "iterations", "ours", "at most, every 4th pixel");
     f("iterations_middle", &P::iterations_middle, 0, 100, "iterations", "ours", "at most, every 2nd pixel");
@@ -87,6 +116,19 @@ struct MaskParams {
   float flood_depth_ratio = 0.007f;
   int32_t erode_px = 15;
   int32_t dilate_px = 10;
+  MaskMethod method = MaskMethod::parts;
+  float contradict_m = 0.05f;
+  float contradict_sigmas = 2.0f;
+  float share_on = 0.5f;
+  float share_off = 0.25f;
+  float moved_m = 0.004f;
+  float moved_sigmas = 0.5f;
+  float moved_usual = 5.0f;
+  float moved_m2 = 0.03f;
+  float part_concave_deg = 35.0f;
+  float blob_m2 = 0.004f;
+  float grow_m = 0.03f;
+  bool warp = true;
 
   template <class F>
   static void fields(F&& f) {
@@ -99,6 +141,30 @@ struct MaskParams {
       "radius of the square erosion of the raw mask");
     f("dilate_px", &P::dilate_px, 0, 32, "pixels of 640 columns", "ours",
       "radius of the square dilation after the flood fill");
+    f("method", &P::method, 0, 1, "residual|parts", "ours",
+      "residual: the paper's; parts: decides for connected parts of the picture from all their points");
+    f("contradict_m", &P::contradict_m, 0, 1.0, "m", "ours",
+      "parts: a point contradicts the map when it is farther from its surface, without noise");
+    f("contradict_sigmas", &P::contradict_sigmas, 0, 10.0, "1", "ours",
+      "and this many standard deviations of the depth are added");
+    f("share_on", &P::share_on, 0, 1.0, "share", "ours",
+      "a part is dynamic when more of its known points contradict the map");
+    f("share_off", &P::share_off, 0, 1.0, "share", "ours", "and when it was, it stays so while more do");
+    f("moved_m", &P::moved_m, 0, 1.0, "m", "ours",
+      "a part whose surface lies farther off than the motion of most of the space would have it is dynamic, "
+      "without noise; 0: not looked at");
+    f("moved_sigmas", &P::moved_sigmas, 0, 10.0, "1", "ours",
+      "and this many standard deviations of the depth are added");
+    f("moved_usual", &P::moved_usual, 0, 100.0, "1", "ours",
+      "and never less than this many times what the parts of the picture usually lie off (median over the "
+      "area)");
+    f("moved_m2", &P::moved_m2, 0, 10.0, "m^2", "ours", "smaller parts are not asked whether they moved");
+    f("part_concave_deg", &P::part_concave_deg, 1.0, 180.0, "degrees", "ours",
+      "a concave edge with a larger bend parts the picture");
+    f("blob_m2", &P::blob_m2, 0, 1.0, "m^2", "ours",
+      "a connected area of contradicting points this large is dynamic by itself");
+    f("grow_m", &P::grow_m, 0, 0.5, "m", "ours", "how far the mask grows beyond what was found");
+    f("warp", &P::warp, 0, 1, "bool", "ours", "the last mask, carried into this frame, is the first guess");
   }
 };
 

@@ -10,12 +10,13 @@ namespace stillmap {
 enum NormalEqTerm : int32_t {
   kHessian = 0,      ///< J^T W J, upper triangle row by row, 21 of them
   kGradient = 21,    ///< J^T W r, 6 of them
-  kCost = 27,        ///< of the points used, robust where asked
+  kCost = 27,        ///< of the points used, robust and weighted
   kSumSdf2 = 28,     ///< of the inliers' squared distances, m^2
   kPoints = 29,      ///< points with a value in the map
   kInliers = 30,     ///< of those, within track.inlier_m of the surface
   kConsidered = 31,  ///< points measured, unmasked, in range
-  kTerms = 32
+  kWeight = 32,      ///< of the points used: each counts as much as it is trusted, 0..1
+  kTerms = 33
 };
 
 /// Sums of one registration pass. T is float within a tile of pixels and double over the image; tiles are

@@ -27,7 +27,7 @@ bool solve_step(const NormalEq& sums, double damping, const Se3& T_map_cam, Step
 }
 
 double mean_cost(const NormalEq& sums) {
-  return sums.sum[kPoints] > 0 ? sums.sum[kCost] / sums.sum[kPoints] : HUGE_VAL;
+  return sums.sum[kWeight] > 0 ? sums.sum[kCost] / sums.sum[kWeight] : HUGE_VAL;
 }
 
 /// A step must lower the mean cost and may not do so by leaving the mapped space.
@@ -95,12 +95,12 @@ void write_covariance(const NormalEq& sums, Vec3 centre, float covariance[21]) {
 }  // namespace
 
 TrackResult register_frame(const PassRunner& pass, const Se3& T_start, const TrackParams& params,
-                           int32_t min_points) {
+                           LevelRange levels, int32_t min_points) {
   const int32_t iterations[3] = {params.iterations_fine, params.iterations_middle, params.iterations_coarse};
   TrackResult result;
   result.T_world_cam = T_start;
   State state{T_start, {}, static_cast<double>(params.damping_initial), false};
-  for (int32_t level = params.levels - 1; level >= 0; --level)
+  for (int32_t level = levels.coarsest; level >= levels.finest; --level)
     result.iterations += run_level(pass, 1 << level, iterations[level], params, state);
 
   const NormalEq& sums = state.sums;
@@ -111,7 +111,8 @@ TrackResult register_frame(const PassRunner& pass, const Se3& T_start, const Tra
   result.rmse_m =
       static_cast<float>(sums.sum[kInliers] > 0 ? std::sqrt(sums.sum[kSumSdf2] / sums.sum[kInliers]) : 0);
   Cholesky6 cholesky;
-  if (sums.sum[kPoints] < min_points || !cholesky.factor(sums.sum + kHessian, 0.0)) {
+  if (sums.sum[kPoints] * (1 << 2 * levels.finest) < min_points ||
+      !cholesky.factor(sums.sum + kHessian, 0.0)) {
     result.status = Status::degenerate;
     return result;
   }

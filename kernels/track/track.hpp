@@ -9,6 +9,19 @@
 
 namespace stillmap {
 
+/// Where the pose is expected before the frame was looked at, and how much that is worth.
+struct PosePrior {
+  Se3 T_map_cam;
+  /// Equivalent of so many points of weight 1 along each axis: x y z of the camera centre, rx ry rz about it,
+  /// map axes. All 0: no prior.
+  float information[6] = {};
+};
+
+/// Which levels a registration goes through.
+struct LevelRange {
+  int32_t coarsest = 2, finest = 0;
+};
+
 /// Sums of one pass over every `step`-th pixel at a pose. A plain function and its context: nothing is
 /// allocated.
 struct PassRunner {
@@ -24,6 +37,6 @@ struct PassRunner {
 /// @return status ok, or degenerate with T_world_cam = T_start
 /// @thread the engine's caller
 TrackResult register_frame(const PassRunner& pass, const Se3& T_start, const TrackParams& params,
-                           int32_t min_points);
+                           LevelRange levels, int32_t min_points);
 
 }  // namespace stillmap

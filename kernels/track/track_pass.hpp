@@ -24,8 +24,7 @@ struct TrackPass {
   VolumeView map;
   ImageView<const float> depth_m;
   ImageView<const LumaChroma> colour;
-  ImageView<const uint8_t> mask;  ///< 0: static
-  bool use_mask = false;          ///< false: the first registration, all pixels
+  ImageView<const uint8_t> trust;  ///< 255: counts in full, 0: not at all; no data: every pixel in full
   Intrinsics k;
   Se3 T_map_cam;
   float max_m = 0;
@@ -48,18 +47,18 @@ struct TrackPass {
     return p;
   }
 
-  STILLMAP_HD bool masked(int32_t row, int32_t col) const { return use_mask && mask.at(row, col) != 0; }
+  STILLMAP_HD float trust01(int32_t row, int32_t col) const {
+    return trust.data ? static_cast<float>(trust.at(row, col)) * (1.0f / 255.0f) : 1.0f;
+  }
 
-  /// All of it for one pixel; the plain form that the vector loops of the CPU are checked against.
+  /// A measurement with the voxels around it. False: out of range, or it has no value in the map.
   template <class Cache>
-  STILLMAP_HD void operator()(int32_t row, int32_t col, Cache& cache, NormalEqT<float>& sums) const {
-    const PixelPoint<float> p =
-        point_of(static_cast<float>(row), static_cast<float>(col), depth_m.at(row, col));
-    if (!p.in_range || masked(row, col)) return;
-    sums.sum[kConsidered] += 1.0f;
+  STILLMAP_HD bool fetch(int32_t row, int32_t col, float z_m, float luma, Cache& cache,
+                         TrackPoint<float>& point) const {
+    const PixelPoint<float> p = point_of(static_cast<float>(row), static_cast<float>(col), z_m);
+    if (!p.in_range) return false;
     VoxelSurface voxel[8];
-    if (!read_corners(map, {p.cell.x, p.cell.y, p.cell.z}, cache, voxel)) return;
-    TrackPoint<float> point;
+    if (!read_corners(map, {p.cell.x, p.cell.y, p.cell.z}, cache, voxel)) return false;
     point.surface = true;
     for (int32_t i = 0; i < 8; ++i) {
       point.sdf[i] = static_cast<float>(voxel[i].sdf);
@@ -68,8 +67,19 @@ struct TrackPass {
     }
     point.fraction = p.cell.fraction;
     point.arm = p.arm;
-    point.measured_luma = static_cast<float>(colour.at(row, col).luma);
-    add_point(point_terms(point, weights), point.arm, 1.0f, sums.sum);
+    point.measured_luma = luma;
+    return true;
+  }
+
+  /// All of it for one pixel; the plain form that the vector loops of the CPU are checked against.
+  template <class Cache>
+  STILLMAP_HD void operator()(int32_t row, int32_t col, Cache& cache, NormalEqT<float>& sums) const {
+    const float trusted = trust01(row, col), z_m = depth_m.at(row, col);
+    if (!(z_m > 0.0f && z_m <= max_m) || trusted == 0.0f) return;
+    sums.sum[kConsidered] += 1.0f;
+    TrackPoint<float> point;
+    if (fetch(row, col, z_m, static_cast<float>(colour.at(row, col).luma), cache, point))
+      add_point(point_terms(point, weights), point.arm, 1.0f, trusted, sums.sum);
   }
 };
 

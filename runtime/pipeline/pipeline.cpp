@@ -92,7 +92,8 @@ FrameResult Pipeline::track_and_map(FrameResult result) {
   result.ms.mask_ms = watch.lap_ms();
   // With nothing masked the second registration is the first one gone on with; nothing is left when it has
   // converged.
-  const bool go_on = mask.masked_valid_pixels > 0 || !initial.converged;
+  const bool go_on =
+      mask.masked_valid_pixels > 0 || !initial.converged || config_.track.first_finest_level > 0;
   const TrackResult refined = go_on ? engine_.refine(initial.T_world_cam) : initial;
   result.ms.refine_ms = watch.lap_ms();
 

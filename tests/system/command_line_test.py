@@ -193,9 +193,12 @@ class Sources(Case):
         self.mapped("--source", f"tum:{clip}", "--out", self.out)
         whole = read_trajectory(self.out / "trajectory.txt")
         self.assertEqual(len(whole), 30)
-        # The folder and the scene itself are the same frames: the same trajectory to the last digit.
+        # The folder and the scene itself are the same frames; only the stamps are rounded, and with them where
+        # the registration of a frame starts.
         self.mapped("--source", SMALL, "--out", self.folder / "direct")
-        self.assertEqual(whole, read_trajectory(self.folder / "direct/trajectory.txt"))
+        for one, other in zip(whole, read_trajectory(self.folder / "direct/trajectory.txt"), strict=True):
+            for a, b in zip(one, other, strict=True):
+                self.assertAlmostEqual(a, b, delta=2e-4)
 
         depth[10].write_bytes(depth[10].read_bytes()[:200])
         depth[15].unlink()

@@ -12,6 +12,7 @@
 #include "kernels/backend/cpu/thread_pool.hpp"
 #include "kernels/engine.hpp"
 #include "kernels/mask/grow_mask.hpp"
+#include "kernels/mask/parts.hpp"
 #include "kernels/track/track.hpp"
 
 namespace stillmap {
@@ -63,6 +64,11 @@ struct CpuMemory {
   ImageView<Pixel> source_pixel;  ///< only with distortion
   ImageView<uint8_t> mask, mask_scratch;
   View<int32_t> flood_queue;
+  ImageView<uint8_t> trust;
+  CellGrid cells;
+  ImageView<float> depth_before_m;  ///< of the cells of the last frame
+  ImageView<uint8_t> dynamic_before;
+  PartMemory part_memory;
   DepthRangePyramid ranges;
   View<NormalEqT<float>> track_tiles;
   View<int32_t> valid_tiles;
@@ -79,6 +85,8 @@ struct CpuMemory {
     colour = arena.take_image<Rgb8>("images", rows, cols);
     mask = arena.take_image<uint8_t>("mask", rows, cols);
     mask_scratch = arena.take_image<uint8_t>("mask", rows, cols);
+    trust = arena.take_image<uint8_t>("mask", rows, cols);
+    carve_cells(arena, p.camera.k);
     flood_queue = arena.take<int32_t>("mask", static_cast<uint64_t>(rows) * static_cast<uint64_t>(cols));
     if (!p.camera.distortion.none()) source_pixel = arena.take_image<Pixel>("undistortion", rows, cols);
     carve_ranges(arena, rows, cols);
@@ -94,6 +102,26 @@ struct CpuMemory {
   }
 
  private:
+  void carve_cells(Arena& arena, const Intrinsics& k) {
+    cells.px = cell_px_for(k.width);
+    cells.k = cell_intrinsics(k, cells.px);
+    const int32_t rows = cells.k.height, cols = cells.k.width;
+    cells.depth_m = arena.take_image<float>("parts", rows, cols);
+    cells.luma = arena.take_image<float>("parts", rows, cols);
+    cells.residual = arena.take_image<CellResidual>("parts", rows, cols);
+    cells.normal = arena.take_image<Vec3>("parts", rows, cols);
+    cells.evidence = arena.take_image<Contradiction>("parts", rows, cols);
+    cells.expected = arena.take_image<uint8_t>("parts", rows, cols);
+    cells.dynamic = arena.take_image<uint8_t>("parts", rows, cols);
+    cells.part = arena.take_image<int32_t>("parts", rows, cols);
+    depth_before_m = arena.take_image<float>("parts", rows, cols);
+    dynamic_before = arena.take_image<uint8_t>("parts", rows, cols);
+    const uint64_t count = static_cast<uint64_t>(rows) * static_cast<uint64_t>(cols);
+    part_memory.parts = arena.take<Part>("parts", count);
+    part_memory.queue = arena.take<int32_t>("parts", count);
+    part_memory.border = arena.take_image<uint8_t>("parts", rows, cols);
+    part_memory.scratch = arena.take_image<uint8_t>("parts", rows, cols);
+  }
   void carve_ranges(Arena& arena, int32_t rows, int32_t cols) {
     ranges.image_rows = rows;
     ranges.image_cols = cols;
@@ -120,12 +148,10 @@ class CpuEngine final : public Engine {
   bool failed() const { return arena_.failed(); }
 
   PrepareResult prepare(const FrameView& frame) override;
-  TrackResult track(const Se3& T_world_cam_start) override {
-    return register_to_map(T_world_cam_start, false);
-  }
+  TrackResult track(const Se3& T_world_cam_start) override;
   MaskResult mask(const Se3& T_world_cam) override;
   TrackResult refine(const Se3& T_world_cam_start) override {
-    return register_to_map(T_world_cam_start, true);
+    return register_to_map(T_world_cam_start, memory_.trust, {params_.track.levels - 1, 0});
   }
   IntegrateResult integrate(const Se3& T_world_cam) override;
   Status raycast(const Se3& T_world_cam, const Intrinsics& k, ImageView<float> depth_m,
@@ -147,7 +173,19 @@ class CpuEngine final : public Engine {
   const Intrinsics& k() const { return params_.camera.k; }
   void fill_source_pixels();
   TrackPass track_pass(const Se3& T_map_cam) const;
-  TrackResult register_to_map(const Se3& T_start, bool masked);
+  TrackResult register_to_map(const Se3& T_start, ImageView<const uint8_t> trust, LevelRange levels);
+  bool by_parts() const { return params_.mask.enabled && params_.mask.method == MaskMethod::parts; }
+  void make_cells();
+  void mask_by_residual(const Se3& T_map_cam);
+  void mask_by_parts(const Se3& T_map_cam);
+  void write_static_pixels(bool masked);
+  template <class F>
+  void in_row_tiles(int32_t rows, const F& f) {
+    pool_.for_each(tiles_of(rows, kRowsPerTile), [&](uint32_t tile) {
+      const int32_t first = static_cast<int32_t>(tile) * kRowsPerTile;
+      f(first, std::min(first + kRowsPerTile, rows));
+    });
+  }
   void set_nothing_masked();
   void update_static_depth();
   VisibleGroupPass visible_pass(const Se3& T_map_cam, const FrameGeometry& geometry) const;
@@ -159,6 +197,8 @@ class CpuEngine final : public Engine {
   const CpuLoops& loops_;
   ThreadPool pool_;
   int32_t frames_ = 0;  ///< integrated, modulo 2^16
+  float usual_ = 1.0f;
+  Se3 T_before_;  ///< pose of the last mask
 };
 
 void CpuEngine::fill_source_pixels() {
@@ -190,6 +230,7 @@ PrepareResult CpuEngine::prepare(const FrameView& frame) {
   PrepareResult result;
   for (uint32_t t = 0; t < tiles; ++t) result.valid_pixels += memory_.valid_tiles[t];
   set_nothing_masked();
+  if (by_parts()) make_cells();
   if (result.valid_pixels < scaled_pixels(params_.depth.min_valid_pixels, k()))
     result.status = Status::bad_data;
   return result;
@@ -197,6 +238,7 @@ PrepareResult CpuEngine::prepare(const FrameView& frame) {
 
 void CpuEngine::set_nothing_masked() {
   std::fill_n(memory_.mask.data, memory_.mask.pixels(), uint8_t{0});
+  std::fill_n(memory_.trust.data, memory_.trust.pixels(), uint8_t{255});
 }
 
 TrackPass CpuEngine::track_pass(const Se3& T_map_cam) const {
@@ -204,28 +246,93 @@ TrackPass CpuEngine::track_pass(const Se3& T_map_cam) const {
   pass.map = memory_.map.view();
   pass.depth_m = memory_.depth_m;
   pass.colour = memory_.luma_chroma;
-  pass.mask = memory_.mask;
   pass.k = k();
   pass.T_map_cam = T_map_cam;
   pass.max_m = params_.depth.max_m;
   const TrackParams& p = params_.track;
-  constexpr float kNoHuber_m = 1e9f;
-  pass.weights = {pass.map.sdf_unit_m(), 1.0f / params_.map.voxel_m, p.colour_weight,
-                  p.huber_depth_m > 0 ? p.huber_depth_m : kNoHuber_m, p.inlier_m};
+  pass.weights = {pass.map.sdf_unit_m(), 1.0f / params_.map.voxel_m, p.colour_weight, p.inlier_m, p.kernel};
   return pass;
 }
 
-TrackResult CpuEngine::register_to_map(const Se3& T_start, bool masked) {
+/// The kernel of a level: wide where the picture is coarse and the pose not yet known well.
+void set_kernel(const EngineParams& params, int32_t step, TrackWeights& weights) {
+  const TrackParams& p = params.track;
+  constexpr float kSquared_m = 1e9f;
+  if (p.kernel == RobustKernel::huber) {
+    weights.kernel_m = p.huber_depth_m > 0 ? p.huber_depth_m : kSquared_m;
+    return;
+  }
+  weights.kernel_m = step >= 4 ? p.kernel_coarse_m : step == 2 ? p.kernel_middle_m : p.kernel_fine_m;
+  weights.kernel_m += p.kernel_sigmas * params.depth.noise_m;
+  weights.kernel_per_range2 = p.kernel_sigmas * params.depth.noise_per_m2;
+}
+
+TrackResult CpuEngine::track(const Se3& T_start) {
+  const LevelRange levels = {params_.track.levels - 1,
+                             std::min(params_.track.first_finest_level, params_.track.levels - 1)};
+  if (!by_parts()) return register_to_map(T_start, {}, levels);
+  if (params_.mask.warp)
+    carry_mask(memory_.depth_before_m, memory_.dynamic_before, inverse(T_start) * T_before_, memory_.cells);
+  write_static_pixels(false);
+  return register_to_map(T_start, memory_.trust, levels);
+}
+
+void CpuEngine::make_cells() {
+  std::fill_n(memory_.cells.expected.data, memory_.cells.expected.pixels(), uint8_t{0});
+  const CellDepthPass depth{memory_.depth_m, memory_.luma_chroma, memory_.cells, params_.depth.max_m};
+  const CellNormalPass normals{memory_.cells};
+  in_row_tiles(memory_.cells.depth_m.rows,
+               [&](int32_t first, int32_t last) { loops_.cell_depth(depth, first, last); });
+  in_row_tiles(memory_.cells.depth_m.rows,
+               [&](int32_t first, int32_t last) { loops_.cell_normals(normals, first, last); });
+}
+
+/// Trust of every pixel: from the expected mask before the decision, from the mask after it.
+void CpuEngine::write_static_pixels(bool masked) {
+  StaticPixelPass pass{memory_.cells,
+                       memory_.depth_m,
+                       masked ? memory_.mask : ImageView<uint8_t>{},
+                       memory_.trust,
+                       {params_.depth.noise_m, params_.depth.noise_per_m2},
+                       params_.track.trust_noise_m,
+                       params_.track.trust_area_m,
+                       0.1f};
+  in_row_tiles(k().height, [&](int32_t first, int32_t last) { loops_.static_pixels(pass, first, last); });
+}
+
+void CpuEngine::mask_by_parts(const Se3& T_map_cam) {
+  const CellGrid& cells = memory_.cells;
+  const DepthNoise noise{params_.depth.noise_m, params_.depth.noise_per_m2};
+  TrackPass track = track_pass(T_map_cam);
+  track.k = cells.k;
+  set_kernel(params_, 2, track.weights);
+  const CellEvidencePass evidence{cells, track, noise, params_.mask.contradict_m,
+                                  params_.mask.contradict_sigmas};
+  in_row_tiles(cells.depth_m.rows,
+               [&](int32_t first, int32_t last) { loops_.cell_evidence(evidence, first, last); });
+  const int32_t parts = segment(cells, memory_.part_memory, params_.mask, noise);
+  gather_parts(cells, parts, memory_.part_memory);
+  agree_on_motion(parts, memory_.part_memory, params_.mask, usual_);
+  decide_parts(cells, parts, memory_.part_memory, params_.mask, usual_);
+  write_static_pixels(true);
+  std::copy_n(cells.depth_m.data, cells.depth_m.pixels(), memory_.depth_before_m.data);
+  std::copy_n(cells.dynamic.data, cells.dynamic.pixels(), memory_.dynamic_before.data);
+  T_before_ = T_map_cam;
+}
+
+TrackResult CpuEngine::register_to_map(const Se3& T_start, ImageView<const uint8_t> trust,
+                                       LevelRange levels) {
   struct Context {
     CpuEngine* engine;
     TrackPass pass;
   } context{this, track_pass(T_start)};
-  context.pass.use_mask = masked;
+  context.pass.trust = trust;
   const PassRunner runner{[](void* opaque, const Se3& T_map_cam, int32_t step) {
                             Context& c = *static_cast<Context*>(opaque);
                             CpuEngine* const engine = c.engine;
                             TrackPass& pass = c.pass;
                             pass.T_map_cam = T_map_cam;
+                            set_kernel(engine->params_, step, pass.weights);
                             const int32_t rows = engine->k().height;
                             const uint32_t tiles = tiles_of(rows, kRowsPerTile);
                             engine->pool_.for_each(tiles, [&](uint32_t tile) {
@@ -238,12 +345,28 @@ TrackResult CpuEngine::register_to_map(const Se3& T_start, bool masked) {
                             return sums;
                           },
                           &context};
-  return register_frame(runner, T_start, params_.track, scaled_pixels(params_.depth.min_valid_pixels, k()));
+  return register_frame(runner, T_start, params_.track, levels,
+                        scaled_pixels(params_.depth.min_valid_pixels, k()));
 }
 
 MaskResult CpuEngine::mask(const Se3& T_world_cam) {
   MaskResult result;
-  if (!params_.mask.enabled) return result;
+  if (!params_.mask.enabled) {
+    std::fill_n(memory_.trust.data, memory_.trust.pixels(), uint8_t{255});
+    return result;
+  }
+  if (by_parts())
+    mask_by_parts(T_world_cam);
+  else
+    mask_by_residual(T_world_cam);
+  for (int32_t i = 0; i < memory_.mask.pixels(); ++i) {
+    result.masked_pixels += memory_.mask.data[i] != 0;
+    result.masked_valid_pixels += memory_.mask.data[i] != 0 && memory_.depth_m.data[i] > 0;
+  }
+  return result;
+}
+
+void CpuEngine::mask_by_residual(const Se3& T_world_cam) {
   const float tau_m = params_.map.truncation_m;
   const ResidualMaskPass pass{memory_.map.view(),
                               memory_.depth_m,
@@ -253,12 +376,6 @@ MaskResult CpuEngine::mask(const Se3& T_world_cam) {
                               params_.depth.max_m,
                               params_.mask.gamma * tau_m * tau_m};
   const int32_t rows = k().height, cols = k().width;
-  const auto in_row_tiles = [&](const auto& f) {
-    pool_.for_each(tiles_of(rows, kRowsPerTile), [&](uint32_t tile) {
-      const int32_t first = static_cast<int32_t>(tile) * kRowsPerTile;
-      f(first, std::min(first + kRowsPerTile, rows));
-    });
-  };
   constexpr int32_t kColsPerTile = 64;
   const auto in_column_tiles = [&](const auto& f) {
     pool_.for_each(tiles_of(cols, kColsPerTile), [&](uint32_t tile) {
@@ -269,19 +386,15 @@ MaskResult CpuEngine::mask(const Se3& T_world_cam) {
   const ImageView<uint8_t> image = memory_.mask, scratch = memory_.mask_scratch;
   const int32_t erode = scaled_px(params_.mask.erode_px, cols),
                 dilate = scaled_px(params_.mask.dilate_px, cols);
-  in_row_tiles([&](int32_t first, int32_t last) {
+  in_row_tiles(rows, [&](int32_t first, int32_t last) {
     loops_.residual_mask(pass, first, last);
     erode_rows(image, scratch, erode, first, last);
   });
   in_column_tiles([&](int32_t first, int32_t last) { erode_columns(scratch, image, erode, first, last); });
   flood_fill(image, memory_.depth_m, params_.mask.flood_depth_ratio, memory_.flood_queue);
-  in_row_tiles([&](int32_t first, int32_t last) { dilate_rows(image, scratch, dilate, first, last); });
+  in_row_tiles(rows, [&](int32_t first, int32_t last) { dilate_rows(image, scratch, dilate, first, last); });
   in_column_tiles([&](int32_t first, int32_t last) { dilate_columns(scratch, image, dilate, first, last); });
-  for (int32_t i = 0; i < image.pixels(); ++i) {
-    result.masked_pixels += image.data[i] != 0;
-    result.masked_valid_pixels += image.data[i] != 0 && memory_.depth_m.data[i] > 0;
-  }
-  return result;
+  for (int32_t i = 0; i < image.pixels(); ++i) memory_.trust.data[i] = image.data[i] ? 0 : 255;
 }
 
 void CpuEngine::update_static_depth() {

@@ -23,7 +23,7 @@ constexpr int32_t kBatch = 64;  ///< pixels of a row at a time: everything about
 /// Points that have a value in the map, component by component.
 struct PointBatch {
   alignas(32) uint32_t voxel[8][kBatch];
-  alignas(32) float fraction[3][kBatch], arm[3][kBatch], luma[kBatch];
+  alignas(32) float fraction[3][kBatch], arm[3][kBatch], luma[kBatch], trust[kBatch];
   int32_t size = 0;
 
   TrackPoint<Float8> at(int32_t first) const {
@@ -67,7 +67,7 @@ struct PixelBatch {
   }
 
   /// Fetches the voxels of pixel `i` and appends it to `out`, unless one of them was never observed.
-  void fetch(const TrackPass& pass, int32_t i, uint16_t measured_luma, TrackBlocks& cache,
+  void fetch(const TrackPass& pass, int32_t i, uint16_t measured_luma, float trust, TrackBlocks& cache,
              PointBatch& out) const {
     VoxelSurface voxel[8];
     if (!read_corners(pass.map, {cell[0][i], cell[1][i], cell[2][i]}, cache, voxel)) return;
@@ -78,6 +78,7 @@ struct PixelBatch {
       out.arm[a][n] = arm[a][i];
     }
     out.luma[n] = static_cast<float>(measured_luma);
+    out.trust[n] = trust;
   }
 };
 
@@ -95,15 +96,16 @@ NormalEqT<float> track(const TrackPass& pass, int32_t first_row, int32_t last_ro
       points.size = 0;
       for (int32_t i = 0; i < pixels.size; ++i) {
         const int32_t c = c0 + i * step;
-        if (!pixels.in_range[i] || pass.masked(r, c)) continue;
+        const float trust = pass.trust01(r, c);
+        if (!pixels.in_range[i] || trust == 0.0f) continue;
         considered += 1.0f;
-        pixels.fetch(pass, i, pass.colour.at(r, c).luma, cache, points);
+        pixels.fetch(pass, i, pass.colour.at(r, c).luma, trust, cache, points);
       }
       for (int32_t i = 0; i < points.size; i += kLanes) {
         const TrackPoint<Float8> p = points.at(i);
         const Float8 live =
             select(Float8::ramp() < Float8(static_cast<float>(points.size - i)), Float8(1.0f), Float8(0.0f));
-        add_point(point_terms(p, pass.weights), p.arm, live, sums);
+        add_point(point_terms(p, pass.weights), p.arm, live, Float8::load(&points.trust[i]), sums);
       }
     }
   NormalEqT<float> total;
@@ -117,6 +119,24 @@ void residual_mask(const ResidualMaskPass& pass, int32_t first_row, int32_t last
   TrackBlocks cache;
   for (int32_t r = first_row; r < last_row; ++r)
     for (int32_t c = 0; c < pass.depth_m.cols; ++c) pass(r, c, cache);
+}
+
+void cell_depth(const CellDepthPass& pass, int32_t first_row, int32_t last_row) {
+  for (int32_t r = first_row; r < last_row; ++r)
+    for (int32_t c = 0; c < pass.cells.depth_m.cols; ++c) pass(r, c);
+}
+void cell_normals(const CellNormalPass& pass, int32_t first_row, int32_t last_row) {
+  for (int32_t r = first_row; r < last_row; ++r)
+    for (int32_t c = 0; c < pass.cells.depth_m.cols; ++c) pass(r, c);
+}
+void cell_evidence(const CellEvidencePass& pass, int32_t first_row, int32_t last_row) {
+  TrackBlocks cache;
+  for (int32_t r = first_row; r < last_row; ++r)
+    for (int32_t c = 0; c < pass.cells.depth_m.cols; ++c) pass(r, c, cache);
+}
+void static_pixels(const StaticPixelPass& pass, int32_t first_row, int32_t last_row) {
+  for (int32_t r = first_row; r < last_row; ++r)
+    for (int32_t c = 0; c < pass.depth_m.cols; ++c) pass(r, c);
 }
 
 void static_depth(const StaticDepthPass& pass, int32_t tile_row) {
@@ -169,7 +189,8 @@ void integrate(const IntegratePass& pass, View<const VisibleBlock> blocks) {
 }  // namespace
 
 extern const CpuLoops STILLMAP_LOOPS;
-const CpuLoops STILLMAP_LOOPS = {STILLMAP_LOOPS_NAME, prepare,       track,    residual_mask,
+const CpuLoops STILLMAP_LOOPS = {STILLMAP_LOOPS_NAME, prepare,       track,         residual_mask,
+                                 cell_depth,          cell_normals,  cell_evidence, static_pixels,
                                  static_depth,        visible_group, integrate};
 
 }  // namespace stillmap

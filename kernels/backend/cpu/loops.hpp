@@ -10,6 +10,7 @@
 #include "kernels/integrate/depth_range.hpp"
 #include "kernels/integrate/integrate_pass.hpp"
 #include "kernels/integrate/visible_blocks.hpp"
+#include "kernels/mask/cells.hpp"
 #include "kernels/mask/residual_mask.hpp"
 #include "kernels/prepare/prepare_pixel.hpp"
 #include "kernels/track/track_pass.hpp"
@@ -23,6 +24,10 @@ struct CpuLoops {
   /// Sums over every `step`-th pixel of every `step`-th row in [first, last).
   NormalEqT<float> (*track)(const TrackPass&, int32_t first_row, int32_t last_row, int32_t step);
   void (*residual_mask)(const ResidualMaskPass&, int32_t first_row, int32_t last_row);
+  void (*cell_depth)(const CellDepthPass&, int32_t first_row, int32_t last_row);
+  void (*cell_normals)(const CellNormalPass&, int32_t first_row, int32_t last_row);
+  void (*cell_evidence)(const CellEvidencePass&, int32_t first_row, int32_t last_row);
+  void (*static_pixels)(const StaticPixelPass&, int32_t first_row, int32_t last_row);
   void (*static_depth)(const StaticDepthPass&, int32_t tile_row);
   GroupView (*visible_group)(const VisibleGroupPass&, uint32_t group);
   void (*integrate)(const IntegratePass&, View<const VisibleBlock>);

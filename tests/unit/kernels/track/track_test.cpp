@@ -21,8 +21,12 @@ using test::CornerView;
 constexpr float kVoxelM = 0.02f, kTruncationM = 0.1f;
 
 TrackWeights weights_of(const TrackParams& p) {
-  return {kTruncationM / static_cast<float>(kSdfMax), 1.0f / kVoxelM, p.colour_weight,
-          p.huber_depth_m > 0 ? p.huber_depth_m : 1e9f, p.inlier_m};
+  return {kTruncationM / static_cast<float>(kSdfMax),
+          1.0f / kVoxelM,
+          p.colour_weight,
+          p.inlier_m,
+          RobustKernel::huber,
+          p.huber_depth_m > 0 ? p.huber_depth_m : 1e9f};
 }
 
 TrackPass pass_of(AnalyticMap& map, const CornerView& view, const Se3& T_map_cam, const TrackParams& params) {
@@ -49,7 +53,7 @@ TrackResult registered(TrackPass pass, const Se3& T_start, const TrackParams& pa
                             return sums;
                           },
                           &pass};
-  return register_frame(runner, T_start, params, min_points);
+  return register_frame(runner, T_start, params, {params.levels - 1, 0}, min_points);
 }
 
 struct PoseError {
@@ -131,7 +135,7 @@ TEST(PointTerms, ResidualsWeightsAndCostAreTheEquations) {
   EXPECT_NEAR(t.depth_weight, 0.02f / 0.05f, 1e-5f);
   EXPECT_NEAR(t.cost, 0.02f * (2 * 0.05f - 0.02f), 1e-6f);
   EXPECT_EQ(t.inlier, 0.0f);
-  w.huber_m = 1e9f;  // squared error everywhere
+  w.kernel_m = 1e9f;  // squared error everywhere
   t = at(-0.05f, 0.5f, 0.5f);
   EXPECT_EQ(t.depth_weight, 1.0f);
   EXPECT_NEAR(t.cost, 0.0025f, 1e-7f);
@@ -187,18 +191,19 @@ TEST_F(TrackTest, PlainPassEqualsTheVectorLoops) {
   std::mt19937 random(12);
   std::bernoulli_distribution hole(0.1), masked(0.2);
   std::normal_distribution<float> noise(0, 0.02f);
-  std::vector<uint8_t> mask(view.depth_m.size());
-  for (size_t i = 0; i < mask.size(); ++i) {
+  std::vector<uint8_t> trust(view.depth_m.size());
+  for (size_t i = 0; i < trust.size(); ++i) {
     view.depth_m[i] = hole(random) ? 0.0f : view.depth_m[i] + noise(random);
-    mask[i] = masked(random) ? 255 : 0;
+    trust[i] = static_cast<uint8_t>(masked(random) ? 0 : 100 + i % 156);
   }
   TrackPass pass = pass_of(map_, view, cast<float>(T_truth_), params_);
-  pass.mask = view.image(mask);
   pass.max_m = 2.1f;  // some are too far
-  for (const bool use_mask : {false, true})
+  pass.weights.kernel_per_range2 = 0.003f;
+  for (const bool use_trust : {false, true})
     for (const int32_t step : {1, 2, 4})
       for (const CpuLoops* loops : {&kLoopsBaseline, &best_loops()}) {
-        pass.use_mask = use_mask;
+        pass.trust = use_trust ? view.image(trust) : ImageView<const uint8_t>{};
+        pass.weights.kernel = use_trust ? RobustKernel::geman_mcclure : RobustKernel::huber;
         NormalEqT<float> plain;
         BlockCache cache;
         for (int32_t r = 32; r < 64; r += step)
@@ -221,21 +226,22 @@ TEST_F(TrackTest, PlainPassEqualsTheVectorLoops) {
                 << loops->name << " step " << step;
         for (int r = 0; r < 6; ++r)
           EXPECT_NEAR(plain.sum[kGradient + r], vector.sum[kGradient + r], 2e-3f * std::sqrt(diagonal[r]));
+        EXPECT_NEAR(plain.sum[kWeight], vector.sum[kWeight], 2.0f);
+        EXPECT_EQ(use_trust, plain.sum[kWeight] < 0.9f * plain.sum[kPoints]);
         EXPECT_NEAR(plain.sum[kCost], vector.sum[kCost], 2e-3f * plain.sum[kCost]);
         EXPECT_NEAR(plain.sum[kSumSdf2], vector.sum[kSumSdf2], 2e-3f * plain.sum[kSumSdf2]);
       }
 }
 
-TEST_F(TrackTest, MaskedInvalidAndFarPixelsAreNotConsidered) {
+TEST_F(TrackTest, UntrustedInvalidAndFarPixelsAreNotConsidered) {
   CornerView view(scene_, corner_camera(32), T_truth_);
-  std::vector<uint8_t> mask(view.depth_m.size(), 255);
-  mask[5] = mask[6] = mask[7] = mask[8] = mask[9] = 0;
+  std::vector<uint8_t> trust(view.depth_m.size(), 0);
+  trust[5] = trust[6] = trust[7] = trust[8] = trust[9] = 255;
   view.depth_m[6] = 0.0f;
   view.depth_m[7] = std::numeric_limits<float>::quiet_NaN();
   view.depth_m[8] = std::numeric_limits<float>::infinity();
   TrackPass pass = pass_of(map_, view, cast<float>(T_truth_), params_);
-  pass.mask = view.image(mask);
-  pass.use_mask = true;
+  pass.trust = view.image(trust);
   const NormalEqT<float> sums = best_loops().track(pass, 0, view.k.height, 1);
   EXPECT_EQ(sums.sum[kConsidered], 2.0f);
   for (const float x : sums.sum) EXPECT_TRUE(std::isfinite(x));
@@ -381,7 +387,7 @@ struct Script {
                               return static_cast<Script*>(context)->answer(T_map_cam);
                             },
                             this};
-    return register_frame(runner, T_start, params, min_points);
+    return register_frame(runner, T_start, params, {params.levels - 1, 0}, min_points);
   }
   NormalEq answer(const Se3& T_map_cam) {
     const size_t call = asked.size();
@@ -395,7 +401,7 @@ struct Script {
     sums.sum[kGradient] = step_m;
     sums.sum[kPoints] = points.empty() ? 1000 : points.at(call);
     sums.sum[kCost] = mean_cost.at(call) * sums.sum[kPoints];
-    sums.sum[kInliers] = sums.sum[kConsidered] = sums.sum[kPoints];
+    sums.sum[kInliers] = sums.sum[kConsidered] = sums.sum[kWeight] = sums.sum[kPoints];
     sums.sum[kSumSdf2] = 4 * sums.sum[kInliers];
     return sums;
   }
@@ -495,7 +501,7 @@ TEST(RegisterFrame, LevelsGoFromCoarseToFine) {
                             return NormalEq{};
                           },
                           &steps};
-  EXPECT_EQ(register_frame(runner, {}, {}, 1).status, Status::degenerate);
+  EXPECT_EQ(register_frame(runner, {}, {}, {}, 1).status, Status::degenerate);
   EXPECT_EQ(steps, (std::vector<int32_t>{4, 2, 1}));
 }
 

@@ -65,6 +65,10 @@ Se3 at(float x, float y = 0) {
 
 class PipelineTest : public testing::Test {
  protected:
+  PipelineTest() {
+    config_.track.prior = MotionPrior::last_pose;
+    config_.track.first_finest_level = 0;
+  }
   /// Both registrations answer this pose and share of inliers.
   void answer(const Se3& T, float inlier_ratio = 0.9f, Status status = Status::ok) {
     engine_.tracked.status = engine_.refined.status = status;

@@ -31,6 +31,16 @@ EngineParams small_params() {
   return p;
 }
 
+/// As the paper has it: every pixel by itself, then the mask from the residuals.
+EngineParams paper_params() {
+  EngineParams p = small_params();
+  p.mask.method = MaskMethod::residual;
+  p.track.kernel = RobustKernel::huber;
+  p.track.trust_noise_m = p.track.trust_area_m = 0;
+  p.track.first_finest_level = 0;
+  return p;
+}
+
 FrameView frame_of(const CornerView& view) {
   return {view.image(view.depth_raw), view.image(view.colour)};
 }
@@ -89,7 +99,7 @@ bool same_mesh(const MeshRecorder& a, const MeshRecorder& b) {
 
 TEST(CpuEngine, PlanIsTheSumOfItsLines) {
   for (const bool distorted : {false, true}) {
-    EngineParams p = small_params();
+    EngineParams p = paper_params();
     if (distorted) p.camera.distortion.k1 = 0.1f;
     const MemoryItems plan = plan_cpu_engine(p);
     uint64_t sum = 0;
@@ -101,7 +111,7 @@ TEST(CpuEngine, PlanIsTheSumOfItsLines) {
 }
 
 TEST(CpuEngine, AFrameOfTheWrongSizeIsBadData) {
-  const Rig rig(small_params());
+  const Rig rig(paper_params());
   const CornerView small({}, corner_camera(80), {}), right({}, corner_camera(kWidth), {});
   EXPECT_EQ(rig.engine->prepare(frame_of(small)).status, Status::bad_data);
   EXPECT_EQ(rig.engine->prepare({right.image(right.depth_raw), small.image(small.colour)}).status,
@@ -111,7 +121,7 @@ TEST(CpuEngine, AFrameOfTheWrongSizeIsBadData) {
 }
 
 TEST(CpuEngine, TooFewValidPixelsAreBadDataAndTouchNothing) {
-  Rig rig(small_params());
+  Rig rig(paper_params());
   CornerView view({}, corner_camera(kWidth), {});
   rig.add(view);
   const MapHealth before = rig.engine->map_health();
@@ -126,7 +136,7 @@ TEST(CpuEngine, TooFewValidPixelsAreBadDataAndTouchNothing) {
 }
 
 TEST(CpuEngine, DepthImageHasInvalidsAsZeroAndKeepsTheFar) {
-  EngineParams p = small_params();
+  EngineParams p = paper_params();
   p.depth.max_m = 1.5f;
   const Rig rig(p);
   CornerView view({}, corner_camera(kWidth), {});
@@ -147,7 +157,7 @@ TEST(CpuEngine, DepthImageHasInvalidsAsZeroAndKeepsTheFar) {
 }
 
 TEST(CpuEngine, MapsTheSceneWithinAVoxelAndTracksInIt) {
-  Rig rig(small_params());
+  Rig rig(paper_params());
   const CornerScene scene;
   const Intrinsics k = corner_camera(kWidth);
   rig.add(CornerView(scene, k, {}), {}, 5);
@@ -173,7 +183,7 @@ TEST(CpuEngine, MapsTheSceneWithinAVoxelAndTracksInIt) {
 }
 
 TEST(CpuEngine, TrackingWithoutAMapIsDegenerateAndLeavesThePose) {
-  const Rig rig(small_params());
+  const Rig rig(paper_params());
   ASSERT_EQ(rig.engine->prepare(frame_of(CornerView({}, corner_camera(kWidth), {}))).status, Status::ok);
   const Se3 T_start = exp(Twist{{1, 2, 3}, {0.1f, 0.2f, 0.3f}});
   const TrackResult track = rig.engine->track(T_start);
@@ -183,7 +193,7 @@ TEST(CpuEngine, TrackingWithoutAMapIsDegenerateAndLeavesThePose) {
 
 // A box comes into what was seen empty: the box, grown by the dilation, and nothing else is masked.
 TEST(CpuEngine, ABoxInFreeSpaceIsMaskedExactly) {
-  Rig rig(small_params());
+  Rig rig(paper_params());
   const Intrinsics k = corner_camera(kWidth);
   rig.add(CornerView({}, k, {}), {}, 3);
   const CornerView view(with_box(), k, {});
@@ -207,7 +217,7 @@ TEST(CpuEngine, ABoxInFreeSpaceIsMaskedExactly) {
 }
 
 TEST(CpuEngine, TheWallStaysWhenTheBoxHasGoneThrough) {
-  Rig rig(small_params());
+  Rig rig(paper_params());
   const Intrinsics k = corner_camera(kWidth);
   const CornerView empty({}, k, {});
   rig.add(empty, {}, 5);
@@ -229,7 +239,7 @@ TEST(CpuEngine, TheWallStaysWhenTheBoxHasGoneThrough) {
 }
 
 TEST(CpuEngine, WhatIsMaskedDoesNotChangeTheMap) {
-  Rig one(small_params()), other(small_params());
+  Rig one(paper_params()), other(paper_params());
   const Intrinsics k = corner_camera(kWidth);
   const CornerView empty({}, k, {});
   one.add(empty, {}, 3);
@@ -253,7 +263,7 @@ TEST(CpuEngine, WhatIsMaskedDoesNotChangeTheMap) {
 }
 
 TEST(CpuEngine, WhatWasStaticAndIsTakenAwayIsCarved) {
-  Rig rig(small_params());
+  Rig rig(paper_params());
   const Intrinsics k = corner_camera(kWidth);
   rig.add(CornerView(with_box(), k, {}), {}, 8);
   const auto centre = static_cast<size_t>(k.height / 2 * k.width + k.width / 2);
@@ -268,9 +278,9 @@ TEST(CpuEngine, WhatWasStaticAndIsTakenAwayIsCarved) {
 }
 
 TEST(CpuEngine, WithoutFreeSpaceABoxInTheAirIsNotMasked) {
-  EngineParams p = small_params();
+  EngineParams p = paper_params();
   p.integrate.free_space = false;
-  Rig with(small_params()), without(p);
+  Rig with(paper_params()), without(p);
   const Intrinsics k = corner_camera(kWidth);
   with.add(CornerView({}, k, {}), {}, 3);
   without.add(CornerView({}, k, {}), {}, 3);
@@ -280,7 +290,7 @@ TEST(CpuEngine, WithoutFreeSpaceABoxInTheAirIsNotMasked) {
 }
 
 TEST(CpuEngine, FreeSpaceComesFromFarMeasurementsUpToTheClippingPlane) {
-  EngineParams p = small_params();
+  EngineParams p = paper_params();
   p.depth.max_m = 1.5f;  // of the back wall nothing is fused
   p.integrate.free_max_m = 1.2f;
   Rig rig(p);
@@ -295,7 +305,7 @@ TEST(CpuEngine, FreeSpaceComesFromFarMeasurementsUpToTheClippingPlane) {
 }
 
 TEST(CpuEngine, MaskCanBeSwitchedOff) {
-  EngineParams p = small_params();
+  EngineParams p = paper_params();
   p.mask.enabled = false;
   Rig rig(p);
   const Intrinsics k = corner_camera(kWidth);
@@ -304,7 +314,7 @@ TEST(CpuEngine, MaskCanBeSwitchedOff) {
 }
 
 TEST(CpuEngine, RefineLooksPastTheMask) {
-  Rig rig(small_params());
+  Rig rig(paper_params());
   const Intrinsics k = corner_camera(kWidth);
   rig.add(CornerView({}, k, {}), {}, 3);
   rig.mask(CornerView(with_box(), k, {}));
@@ -314,7 +324,7 @@ TEST(CpuEngine, RefineLooksPastTheMask) {
 }
 
 TEST(CpuEngine, ATinyPoolIsCountedAndFarBlocksAreDropped) {
-  EngineParams p = small_params();
+  EngineParams p = paper_params();
   p.map.pool_blocks = 300;
   Rig rig(p);
   const Intrinsics k = corner_camera(kWidth);
@@ -337,7 +347,7 @@ TEST(CpuEngine, ATinyPoolIsCountedAndFarBlocksAreDropped) {
 }
 
 TEST(CpuEngine, ResetForgetsTheMap) {
-  Rig rig(small_params());
+  Rig rig(paper_params());
   const Intrinsics k = corner_camera(kWidth);
   rig.add(CornerView({}, k, {}), {}, 2);
   EXPECT_GT(rig.engine->map_health().blocks, 0u);
@@ -350,7 +360,7 @@ TEST(CpuEngine, ResetForgetsTheMap) {
 }
 
 TEST(CpuEngine, UndistortsWithTheCameraModel) {
-  EngineParams p = small_params();
+  EngineParams p = paper_params();
   p.camera.distortion = {0.2f, -0.1f, 0.002f, -0.001f, 0.0f};
   Rig rig(p);
   const Intrinsics k = corner_camera(kWidth);
@@ -375,7 +385,7 @@ struct Trace {
   MapHealth health;
 
   explicit Trace(int32_t threads) {
-    EngineParams p = small_params();
+    EngineParams p = paper_params();
     p.threads = threads;
     Rig rig(p);
     const Intrinsics k = corner_camera(kWidth);

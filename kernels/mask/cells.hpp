@@ -1,0 +1,231 @@
+#pragma once
+
+// The picture in cells: squares of pixels with one depth, one normal and one comparison with the map each.
+// Whole parts are found on cells; their averages have a quarter of a pixel's noise.
+
+#include <cmath>
+#include <cstdint>
+
+#include "kernels/base/pinhole.hpp"
+#include "kernels/base/se3.hpp"
+#include "kernels/map/volume_view.hpp"
+#include "kernels/track/track_pass.hpp"
+
+namespace stillmap {
+
+constexpr int32_t kCellsAcross = 160;  ///< about so many cells in a row of the picture
+
+STILLMAP_HD int32_t cell_px_for(int32_t image_cols) {
+  const int32_t px = image_cols / kCellsAcross;
+  return px < 1 ? 1 : px;
+}
+
+/// What the map says about a cell: 0 near the mapped surface, 1 well away from it (in space that was seen
+/// free, or behind a surface by less than tau), between them doubt.
+using Contradiction = float;
+constexpr Contradiction kUnknown = -1.0f;  ///< no measurement, or nothing was ever observed there
+
+/// Standard deviation of a depth measurement, metres.
+struct DepthNoise {
+  float close_m = 0.001f, per_m2 = 0.0015f;
+
+  STILLMAP_HD float at(float z_m) const { return close_m + per_m2 * z_m * z_m; }
+};
+
+/// A cell against the map: what it adds to the least squares of its part (paper Eq. (4), at one point).
+struct CellResidual {
+  PointTerms<float> terms;
+  Vec3 arm;          ///< camera centre to point, metres, map axes
+  float weight = 0;  ///< robust, and by the sensor's noise; 0: no value in the map
+};
+
+/// Images of the size of the cell grid.
+struct CellGrid {
+  int32_t px = 4;            ///< pixels along the edge of a cell
+  Intrinsics k;              ///< of the grid: cell (r, c) is pixel (r, c) of this camera
+  ImageView<float> depth_m;  ///< mean of the pixels on one surface; 0: none
+  ImageView<float> luma;     ///< mean of the same pixels, kLumaScale is white
+  ImageView<Vec3> normal;    ///< camera frame, towards the camera; 0: none
+  ImageView<Contradiction> evidence;
+  ImageView<CellResidual> residual;
+  ImageView<uint8_t> expected;  ///< 255: dynamic by the last frame's mask, carried into this one
+  ImageView<uint8_t> dynamic;   ///< 255: dynamic
+  ImageView<int32_t> part;      ///< number of the connected part a cell belongs to; < 0: none
+
+  STILLMAP_HD Vec3 point(int32_t row, int32_t col) const {
+    return unproject(k, static_cast<float>(col), static_cast<float>(row), depth_m.at(row, col));
+  }
+};
+
+/// Camera of the grid of cells: the centre of cell (r, c) is its pixel (r, c).
+STILLMAP_HD Intrinsics cell_intrinsics(const Intrinsics& k, int32_t px) {
+  const float s = 1.0f / static_cast<float>(px), half = 0.5f * static_cast<float>(px - 1);
+  return {k.fx * s, k.fy * s, (k.cx - half) * s, (k.cy - half) * s, k.width / px, k.height / px};
+}
+
+/// A jump between neighbouring measurements that parts two surfaces (facts of the sensor: over its noise).
+STILLMAP_HD float depth_edge_m(float z_m) {
+  return fmaxf(0.025f * z_m, 0.03f);
+}
+
+/// Depth of one cell: the mean of the pixels that lie on the surface in its middle.
+struct CellDepthPass {
+  ImageView<const float> depth_m;
+  ImageView<const LumaChroma> colour;
+  CellGrid cells;
+  float max_m = 0;
+
+  STILLMAP_HD void operator()(int32_t row, int32_t col) const {
+    const int32_t r0 = row * cells.px, c0 = col * cells.px;
+    const float middle_m = reference(r0, c0);
+    float sum = 0, luma = 0, count = 0;
+    for (int32_t r = r0; middle_m > 0.0f && r < r0 + cells.px; ++r)
+      for (int32_t c = c0; c < c0 + cells.px; ++c) {
+        const float z_m = depth_m.at(r, c);
+        if (!usable(z_m) || fabsf(z_m - middle_m) > depth_edge_m(middle_m)) continue;
+        sum += z_m;
+        luma += static_cast<float>(colour.at(r, c).luma);
+        count += 1.0f;
+      }
+    cells.depth_m.at(row, col) = count > 0.0f ? sum / count : 0.0f;
+    cells.luma.at(row, col) = count > 0.0f ? luma / count : 0.0f;
+  }
+
+ private:
+  STILLMAP_HD bool usable(float z_m) const { return z_m > 0.0f && z_m <= max_m; }
+  /// First usable depth, from the middle outwards on the diagonal, then any.
+  STILLMAP_HD float reference(int32_t r0, int32_t c0) const {
+    const int32_t middle = cells.px / 2;
+    if (usable(depth_m.at(r0 + middle, c0 + middle))) return depth_m.at(r0 + middle, c0 + middle);
+    for (int32_t r = r0; r < r0 + cells.px; ++r)
+      for (int32_t c = c0; c < c0 + cells.px; ++c)
+        if (usable(depth_m.at(r, c))) return depth_m.at(r, c);
+    return 0.0f;
+  }
+};
+
+/// Normal of one cell from its neighbours on the same surface.
+struct CellNormalPass {
+  CellGrid cells;
+
+  STILLMAP_HD void operator()(int32_t row, int32_t col) const {
+    Vec3 across, down;
+    Vec3 n = {};
+    if (cells.depth_m.at(row, col) > 0.0f && difference(row, col, 0, 1, across) &&
+        difference(row, col, 1, 0, down)) {
+      n = cross(down, across);
+      const float size = norm(n);
+      n = size > 0.0f ? (1.0f / size) * n : Vec3{};
+    }
+    cells.normal.at(row, col) = n;
+  }
+
+ private:
+  STILLMAP_HD bool difference(int32_t row, int32_t col, int32_t dr, int32_t dc, Vec3& d) const {
+    const bool before = same_surface(row, col, row - dr, col - dc);
+    const bool after = same_surface(row, col, row + dr, col + dc);
+    if (!before && !after) return false;
+    const Vec3 from = before ? cells.point(row - dr, col - dc) : cells.point(row, col);
+    const Vec3 to = after ? cells.point(row + dr, col + dc) : cells.point(row, col);
+    d = to - from;
+    return true;
+  }
+  STILLMAP_HD bool same_surface(int32_t row, int32_t col, int32_t r, int32_t c) const {
+    if (!cells.depth_m.contains(r, c)) return false;
+    const float a = cells.depth_m.at(row, col), b = cells.depth_m.at(r, c);
+    return b > 0.0f && fabsf(a - b) <= 2.0f * depth_edge_m(a);
+  }
+};
+
+/// Compares one cell with the map at a pose.
+struct CellEvidencePass {
+  CellGrid cells;
+  TrackPass track;  ///< its pose, map and weights; the camera is that of the grid
+  DepthNoise noise;
+  float contradict_m = 0.02f;
+  float contradict_sigmas = 2.0f;
+
+  template <class Cache>
+  STILLMAP_HD void operator()(int32_t row, int32_t col, Cache& cache) const {
+    const float z_m = cells.depth_m.at(row, col);
+    CellResidual residual;
+    Contradiction contradiction = kUnknown;
+    TrackPoint<float> point;
+    if (track.fetch(row, col, z_m, cells.luma.at(row, col), cache, point)) {
+      residual.terms = point_terms(point, track.weights);
+      residual.arm = point.arm;
+      residual.weight = residual.terms.depth_weight;
+      const float limit_m =
+          fminf(contradict_m + contradict_sigmas * noise.at(z_m), 0.9f * track.map.truncation_m);
+      const float off = fabsf(residual.terms.depth_residual_m) / limit_m;
+      contradiction = fminf(fmaxf(2.0f * (off - 0.5f), 0.0f), 1.0f);
+    }
+    cells.residual.at(row, col) = residual;
+    cells.evidence.at(row, col) = contradiction;
+  }
+};
+
+/// Of one pixel: dynamic or not, from the cell of its surface, and how far tracking may trust it.
+struct StaticPixelPass {
+  CellGrid cells;
+  ImageView<const float> depth_m;
+  ImageView<uint8_t> mask;   ///< 255: dynamic; no data: cells.expected decides for the whole cell
+  ImageView<uint8_t> trust;  ///< see TrackPass
+  DepthNoise noise;
+  float trust_noise_m = 0;  ///< 0: noise changes no trust
+  float trust_area_m = 0;
+  float expected_trust = 0;
+
+  STILLMAP_HD void operator()(int32_t row, int32_t col) const {
+    const int32_t r = clamped(row / cells.px, cells.depth_m.rows),
+                  c = clamped(col / cells.px, cells.depth_m.cols);
+    const float z_m = depth_m.at(row, col);
+    bool dynamic;
+    if (mask.data) {
+      dynamic = dynamic_at(r, c, z_m);
+      mask.at(row, col) = dynamic ? 255 : 0;
+    } else {
+      dynamic = cells.expected.at(r, c) != 0;
+    }
+    float t = 255.0f;
+    if (trust_noise_m > 0.0f) {
+      const float n = noise.at(z_m), s2 = trust_noise_m * trust_noise_m;
+      t *= s2 / (s2 + n * n);
+    }
+    if (trust_area_m > 0.0f && !mask.data) {
+      const float s = z_m / trust_area_m;
+      t *= fminf(1.0f, s * s);
+    }
+    if (dynamic) t *= mask.data ? 0.0f : expected_trust;
+    trust.at(row, col) = static_cast<uint8_t>(t + 0.5f);
+  }
+
+ private:
+  STILLMAP_HD static int32_t clamped(int32_t i, int32_t size) { return i < size ? i : size - 1; }
+
+  /// The cell around, or, where its surface is another one, the neighbour whose depth is nearest. Between two
+  /// surfaces (a flying pixel) the dynamic one has it.
+  STILLMAP_HD bool dynamic_at(int32_t r, int32_t c, float z_m) const {
+    const bool own = cells.dynamic.at(r, c) != 0;
+    const float cell_m = cells.depth_m.at(r, c);
+    if (z_m <= 0.0f) return own;
+    if (cell_m > 0.0f && fabsf(cell_m - z_m) <= depth_edge_m(z_m)) return own;
+    float best_m = depth_edge_m(z_m);
+    bool found = false, dynamic = false, any = own;
+    for (int32_t i = 0; i < 9; ++i) {
+      const int32_t nr = r + i / 3 - 1, nc = c + i % 3 - 1;
+      if (!cells.depth_m.contains(nr, nc)) continue;
+      const bool here = cells.dynamic.at(nr, nc) != 0;
+      const float away_m = fabsf(cells.depth_m.at(nr, nc) - z_m);
+      any |= here;
+      if (cells.depth_m.at(nr, nc) > 0.0f && away_m <= best_m) {
+        best_m = away_m;
+        found = true;
+        dynamic = here;
+      }
+    }
+    return found ? dynamic : any;
+  }
+};
+
+}  // namespace stillmap

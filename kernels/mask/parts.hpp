@@ -1,0 +1,55 @@
+#pragma once
+
+// Decides for whole parts of the picture what moves: segments the cells by depth and bends, and counts for
+// each part what contradicts the map. Host code of both engines; the grid is small (about 160 x 120).
+
+#include "kernels/mask/cells.hpp"
+#include "kernels/params.hpp"
+
+namespace stillmap {
+
+/// What is known of one connected part of the picture.
+struct Part {
+  int32_t cells = 0, expected = 0;
+  float known = 0, contradicts = 0;       ///< cells with a value in the map; sum of their contradiction
+  float area_m2 = 0, contradicts_m2 = 0;  ///< as seen; of what contradicts
+  float noise_m = 0;                      ///< mean of the cells' noise
+  NormalEq motion;                        ///< its own least squares by the motion of the camera
+  float moved_m = 0;  ///< how far its surface lies off where the whole picture would have it
+  bool dynamic = false;
+};
+
+/// Memory of the segmentation: one entry a cell.
+struct PartMemory {
+  View<Part> parts;
+  View<int32_t> queue;
+  ImageView<uint8_t> border;  ///< cells on a bend
+  ImageView<uint8_t> scratch;
+};
+
+/// Fills cells.part: connected cells without a jump in depth or a concave bend between them have the same
+/// number.
+/// @return number of parts                                              test: parts_test
+int32_t segment(const CellGrid& cells, const PartMemory& memory, const MaskParams& params,
+                const DepthNoise& noise);
+
+/// Adds up evidence and least squares of each part.                    test: parts_test
+void gather_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory);
+
+/// The motion that most of the *space* agrees on: movers may fill the picture, but not the room. Parts that
+/// follow another motion lose their vote; fills Part::moved_m.           test: parts_test
+/// @return increment of the pose about the camera centre (see TrackPass), zero when it cannot be told
+/// @param usual >= 1: how many times farther than expected the parts of a still picture lie off with this
+/// sensor; learned: follows the median up at once, and down in seconds
+Twistd agree_on_motion(int32_t parts, const PartMemory& memory, const MaskParams& params, float& usual);
+
+/// Fills cells.dynamic from evidence, expectation and parts.             test: parts_test
+void decide_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory, const MaskParams& params,
+                  float usual);
+
+/// Carries the dynamic cells of the last frame into this one: fills now.expected.    test: parts_test
+/// @param before last frame's grid (depth and dynamic are read); @param T_now_before its camera to this one's
+void carry_mask(const ImageView<const float>& depth_before_m, const ImageView<const uint8_t>& dynamic_before,
+                const Se3& T_now_before, const CellGrid& now);
+
+}  // namespace stillmap
