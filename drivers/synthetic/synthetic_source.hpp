@@ -27,4 +27,7 @@ Result<std::unique_ptr<FrameSource>> open_synthetic(const std::string& spec, int
 /// The scenes, without their "-static" twins.
 std::vector<std::string> synthetic_scene_names();
 
+/// Something moves in this scene, so that its "-static" twin is another one. False for names of no scene.
+bool synthetic_scene_moves(const std::string& name);
+
 }  // namespace stillmap

@@ -23,15 +23,28 @@ void add_bench(CLI::App& app, int& exit_code) {
       ->check(CLI::IsMember({"steps", "accuracy", "scale", "soak"}))
       ->capture_default_str();
   command->add_flag("--json", o->json, "machine-readable");
-  command->add_option("--config", o->configs, "TOML file; accuracy: may be repeated, a column group each")
+  command->add_option("--config", o->configs, "TOML file; accuracy: may be repeated, without it both presets")
       ->allow_extra_args(false);
   command->add_option("--set", o->settings, "section.key=value; may be repeated")->allow_extra_args(false);
-  command->add_option("--source", o->sources, "steps: what to time; accuracy: only these, may be repeated")
+  command
+      ->add_option("--source", o->sources,
+                   "steps: what to time; accuracy: only these, may be repeated (a recording as "
+                   "SOURCE@SKIP+MAX is cut)")
       ->allow_extra_args(false);
   command->add_option("--frames", o->frames, "steps: how many frames to preload")
       ->check(CLI::Range(2, 2000))
       ->capture_default_str();
-  command->add_option("--out", o->out, "accuracy: where the runs are left")->capture_default_str();
+  command->add_option("--seeds", o->seeds, "accuracy: runs of each synthetic scene, seed 1, 2, ...")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  command->add_option("--size", o->size, "accuracy: WxH of the synthetic scenes");
+  command->add_option("--seconds", o->seconds, "accuracy: length of the synthetic scenes");
+  command->add_flag("--twins", o->twins, "accuracy: also the static twin of each --source that moves");
+  command->add_option("--skip-frames", o->skip_frames, "accuracy: pass over the first frames of recordings");
+  command->add_option("--max-frames", o->max_frames,
+                      "accuracy: stop recordings after so many frames (0: all)");
+  command->add_option("--out", o->out, "accuracy: where tables and runs are left; meshes only with one seed")
+      ->capture_default_str();
   command->callback([o, &exit_code] { exit_code = bench(*o); });
 }
 

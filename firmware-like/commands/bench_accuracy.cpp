@@ -1,145 +1,101 @@
 #include <fmt/format.h>
 
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
-#include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "drivers/synthetic/synthetic_source.hpp"
+#include "firmware-like/commands/accuracy_jobs.hpp"
+#include "firmware-like/commands/accuracy_run.hpp"
 #include "firmware-like/commands/bench_options.hpp"
 #include "firmware-like/commands/command.hpp"
-#include "firmware-like/commands/run.hpp"
 #include "firmware-like/commands/stop_signal.hpp"
-#include "runtime/evaluate/ate.hpp"
-#include "runtime/evaluate/model.hpp"
+#include "runtime/evaluate/accuracy_files.hpp"
+#include "runtime/record/output_file.hpp"
 
 namespace stillmap {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
-/// What one run on one scene came to; a figure that could not be had is NaN.
-struct Score {
-  std::string scene, preset, error;
-  int exit_code = 0;
-  double ate_m = 0, within_2cm = 0, ghosts = 0, masked = 0, total_ms_p50 = 0;
-  uint64_t frames = 0, lost_frames = 0;
+struct Column {
+  const char* head;
+  double AccuracyFigures::*figure;
+  double scale;
+  int decimals;
 };
 
-std::string preset_name(const std::string& config) {
-  return config.empty() ? "default" : std::filesystem::path(config).stem().string();
-}
-
-void read_report(const std::string& path, Score& score) {
-  std::ifstream file(path);
-  const Json json = Json::parse(file, nullptr, /*allow_exceptions=*/false);
-  if (json.is_discarded()) {
-    score.error = path + ": cannot be read";
-    return;
-  }
-  score.frames = json.value("frames", uint64_t{0});
-  score.lost_frames = json.value("lost_frames", uint64_t{0});
-  score.masked = json.value("masked_fraction_mean", 0.0);
-  score.total_ms_p50 = json.value("/ms/total/p50"_json_pointer, 0.0);
-}
-
-Score score_run(const BenchOptions& o, const std::string& source, const std::string& config) {
-  Score score;
-  score.scene = source;
-  score.preset = preset_name(config);
-  RunOptions run_options;
-  run_options.source = source;
-  run_options.config = config;
-  run_options.settings = o.settings;
-  run_options.settings.emplace_back("record.keep_previous=0");
-  run_options.settings.emplace_back("record.mesh=true");
-  std::string folder = source.substr(source.find(':') + 1);
-  std::replace(folder.begin(), folder.end(), '/', '_');
-  run_options.out = o.out + "/" + score.preset + "/" + folder;
-  run_options.quiet = true;
-  score.exit_code = run(run_options);
-  if (score.exit_code != kExitDone && score.exit_code != kExitLost) {
-    score.error = "the run failed";
-    return score;
-  }
-  read_report(run_options.out + "/report.json", score);
-  const auto truth = read_trajectory(run_options.out + "/truth.txt");
-  const auto estimate = read_trajectory(run_options.out + "/trajectory.txt");
-  if (!truth || !estimate) {
-    score.error = truth ? estimate.error() : truth.error();
-    return score;
-  }
-  const auto ate = absolute_trajectory_error(*truth, *estimate);
-  const auto model = evaluate_model(run_options.out + "/truth_cloud.ply", run_options.out + "/mesh.ply");
-  if (!ate || !model) {
-    score.error = ate ? model.error() : ate.error();
-    return score;
-  }
-  score.ate_m = ate->translation_m.rmse;
-  score.within_2cm = model->to_surface.within_2cm;
-  score.ghosts = model->to_surface.ghosts;
-  return score;
-}
+constexpr Column kColumns[] = {{"ATE cm", &AccuracyFigures::ate_rmse_m, 100, 2},
+                               {"IoU %", &AccuracyFigures::mask_iou, 100, 1},
+                               {"false %", &AccuracyFigures::static_masked, 100, 2},
+                               {"undecl", &AccuracyFigures::undeclared_loss, 1, 0},
+                               {"declrd", &AccuracyFigures::declared_loss, 1, 0},
+                               {"lost", &AccuracyFigures::lost_frames, 1, 0},
+                               {"< 2 cm %", &AccuracyFigures::within_2cm, 100, 1},
+                               {"ghosts %", &AccuracyFigures::ghosts, 100, 2},
+                               {"there %", &AccuracyFigures::completeness, 100, 1},
+                               {"masked %", &AccuracyFigures::masked_fraction_mean, 100, 1},
+                               {"ms p50", &AccuracyFigures::total_ms_p50, 1, 1}};
 
 void print_head() {
-  fmt::print("{:<28} {:<12} {:>8} {:>9} {:>8} {:>8} {:>6} {:>8}\n", "scene", "preset", "ATE cm", "< 2 cm %",
-             "ghosts %", "masked %", "lost", "ms p50");
+  fmt::print("{:<34} {:<10} {:>4}", "scene", "preset", "seed");
+  for (const Column& c : kColumns) fmt::print(" {:>8}", c.head);
+  fmt::print(" {:>7} {:>7}\n", "chi2 %", "good %");
 }
 
-void print_row(const Score& s) {
-  const std::string scene = s.scene.substr(s.scene.find(':') + 1);
-  if (!s.error.empty())
-    fmt::print("{:<28} {:<12} {}\n", scene, s.preset, s.error);
-  else
-    fmt::print("{:<28} {:<12} {:>8.2f} {:>9.1f} {:>8.2f} {:>8.1f} {:>6} {:>8.1f}\n", scene, s.preset,
-               100 * s.ate_m, 100 * s.within_2cm, 100 * s.ghosts, 100 * s.masked, s.lost_frames,
-               s.total_ms_p50);
+std::string number(double value, int decimals) {
+  return std::isnan(value) ? std::string("-") : fmt::format("{:.{}f}", value, decimals);
+}
+
+void print_row(const AccuracyRun& run) {
+  fmt::print("{:<34} {:<10} {:>4}", run.scene, run.preset, run.seed);
+  const AccuracyFigures& f = run.figures;
+  if (!run.error.empty()) {
+    fmt::print(" {}\n", run.error);
+  } else {
+    for (const Column& c : kColumns) fmt::print(" {:>8}", number(c.scale * (f.*c.figure), c.decimals));
+    fmt::print(" {:>7} {:>7}\n", number(100 * f.chi2_inside / f.chi2_frames, 1),
+               number(100 * f.in_view_good / f.in_view, 1));
+  }
   std::fflush(stdout);
 }
 
-Json json_row(const Score& s) {
-  Json row = {{"scene", s.scene}, {"preset", s.preset}, {"exit_code", s.exit_code}};
-  if (!s.error.empty()) {
-    row["error"] = s.error;
-    return row;
-  }
-  row.update({{"frames", s.frames},
-              {"lost_frames", s.lost_frames},
-              {"ate_rmse_m", s.ate_m},
-              {"within_2cm", s.within_2cm},
-              {"ghosts", s.ghosts},
-              {"masked_fraction_mean", s.masked},
-              {"total_ms_p50", s.total_ms_p50}});
-  return row;
+/// Rows are kept as they come: a bench of hours that is stopped leaves what it measured.
+std::string write_files(const std::string& out, const std::vector<AccuracyRun>& runs) {
+  for (const auto& [name, content] : {std::pair{"/accuracy.csv", accuracy_csv(runs)},
+                                      std::pair{"/accuracy.json", accuracy_json(runs) + "\n"}})
+    if (std::string error = write_whole_file(out + name, content); !error.empty()) return error;
+  return {};
 }
 
 }  // namespace
 
 int bench_accuracy(const BenchOptions& o) {
   catch_stop_signals();
-  std::vector<std::string> sources = o.sources;
-  if (sources.empty())
-    for (const std::string& scene : synthetic_scene_names()) sources.push_back("synthetic:" + scene);
-  const std::vector<std::string> configs = o.configs.empty() ? std::vector<std::string>{""} : o.configs;
-  Json rows = Json::array();
+  const auto jobs = accuracy_jobs(o);
+  if (!jobs) return fail(jobs.error(), jobs.error_kind());
+  std::error_code code;
+  std::filesystem::create_directories(o.out, code);
+  auto calibration = OutputFile::create(o.out + "/calibration.csv", OutputFile::Kind::stream);
+  if (!calibration) return fail(calibration.error(), ErrorKind::failed);
+  calibration->write(calibration_csv_head());
+  std::vector<AccuracyRun> runs;
   bool all_good = true;
   if (!o.json) print_head();
-  for (const std::string& source : sources) {
-    for (const std::string& config : configs) {
-      if (stop_requested()) break;
-      const Score score = score_run(o, source, config);
-      if (score.exit_code == kExitUsage || score.exit_code == kExitNoSource) return score.exit_code;
-      all_good = all_good && score.error.empty();
-      if (o.json)
-        rows.push_back(json_row(score));
-      else
-        print_row(score);
-    }
+  for (const AccuracyJob& job : *jobs) {
+    if (stop_requested()) break;
+    AccuracyOutcome outcome = run_job(job, o.seeds == 1);
+    if (outcome.run.exit_code == kExitUsage || outcome.run.exit_code == kExitNoSource)
+      return outcome.run.exit_code;
+    all_good = all_good && outcome.run.error.empty();
+    if (!o.json) print_row(outcome.run);
+    calibration->write(calibration_csv(outcome.run, outcome.frames));
+    runs.push_back(std::move(outcome.run));
+    relate_to_twins(runs);
+    if (const std::string error = write_files(o.out, runs); !error.empty())
+      return fail(error, ErrorKind::failed);
   }
-  if (o.json) fmt::print("{}\n", rows.dump(2));
+  if (o.json) fmt::print("{}\n", accuracy_json(runs));
+  if (!calibration->close()) return fail(calibration->error(), ErrorKind::failed);
   return all_good ? kExitDone : kExitFailed;
 }
 

@@ -12,13 +12,18 @@ struct BenchOptions {
   std::vector<std::string> configs, settings, sources;
   std::string out = "out/bench";
   int32_t frames = 60;
+  uint32_t seeds = 1;
+  std::string size;                          ///< "WxH" of synthetic scenes; "": as they say
+  std::string seconds;                       ///< of synthetic scenes; "": as they say
+  bool twins = false;                        ///< with each dynamic scene named by --source its static twin
+  uint32_t skip_frames = 0, max_frames = 0;  ///< of recordings
   bool json = false;
 };
 
 /// Times of every step over a preloaded clip. @return the exit code
 int bench_steps(const BenchOptions& options);
 
-/// Trajectory and model errors on the synthetic scenes. @return the exit code
+/// Both presets against truth on the synthetic scenes, and on recordings. @return the exit code
 int bench_accuracy(const BenchOptions& options);
 
 }  // namespace stillmap

@@ -77,7 +77,7 @@ int exit_code_of(const LoopEnd& end, const RunOutputs& outputs, const PipelineCo
 
 }  // namespace
 
-int run(const RunOptions& o) {
+int run(const RunOptions& o, FrameObserver* observer) {
   catch_stop_signals();
   const auto plan = plan_run(o);
   if (!plan) return fail(plan.error(), plan.error_kind());
@@ -106,10 +106,12 @@ int run(const RunOptions& o) {
   if (!outputs) return fail(outputs.error(), ErrorKind::failed);
   (*outputs)->event(Stamp{}, "start", fmt::format("{}, cpu engine, {} threads", info.name, params.threads));
 
+  if (observer) observer->begin(source, info);
   FrameSlot slot(info);
   Pipeline pipeline(*engine, config, plan->T_map_cam);
   Progress progress(frames, o.quiet);
-  const LoopEnd end = run_loop(source, *engine, pipeline, **outputs, progress, slot.frame(), o.max_frames);
+  const LoopEnd end =
+      run_loop(source, *engine, pipeline, **outputs, progress, slot.frame(), o.max_frames, observer);
   const double seconds = progress.seconds();
   (*outputs)->finish(*engine, source, pipeline.counters());
   if (!o.quiet) print_summary(o, **outputs, pipeline.counters(), seconds);

@@ -32,7 +32,7 @@ std::string jump_text(const RgbdFrame& frame, Stamp last) {
 }  // namespace
 
 LoopEnd run_loop(FrameSource& source, Engine& engine, Pipeline& pipeline, RunOutputs& outputs,
-                 Progress& progress, RgbdFrame& slot, uint32_t max_frames) {
+                 Progress& progress, RgbdFrame& slot, uint32_t max_frames, FrameObserver* observer) {
   LoopEnd end;
   Stamp last;
   auto report_due = std::chrono::steady_clock::now() + kReportPeriod;
@@ -54,6 +54,7 @@ LoopEnd run_loop(FrameSource& source, Engine& engine, Pipeline& pipeline, RunOut
     last = result.stamp;
     end.state = result.state;
     outputs.add(slot, result, engine);
+    if (observer) observer->see(slot, result, engine);
     progress.show(result, ++done);
     if (std::chrono::steady_clock::now() < report_due) continue;
     outputs.rewrite_report(pipeline.counters());
