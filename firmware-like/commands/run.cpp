@@ -107,7 +107,7 @@ int run(const RunOptions& o) {
   (*outputs)->event(Stamp{}, "start", fmt::format("{}, cpu engine, {} threads", info.name, params.threads));
 
   FrameSlot slot(info);
-  Pipeline pipeline(*engine, config, plan->T_map_cam);
+  Pipeline pipeline(*engine, config, plan->T_map_cam, source.odometry());
   Progress progress(frames, o.quiet);
   const LoopEnd end = run_loop(source, *engine, pipeline, **outputs, progress, slot.frame(), o.max_frames);
   const double seconds = progress.seconds();
