@@ -3,6 +3,7 @@
 // Everything that can be set, in sections as CONTRACT names them. Algorithm numbers are in
 // kernels/params.hpp.
 
+#include <array>
 #include <cstdint>
 #include <string>
 
@@ -44,6 +45,42 @@ struct SourceConfig {
     f("time_offset_ms", &P::time_offset_ms, -1e4, 1e4, "ms", "ours",
       "added to the colour stamp before pairing");
     f("max_pair_ms", &P::max_pair_ms, 0, 1000, "ms", "ours", "largest distance of the stamps of a pair");
+  }
+};
+
+/// Where the camera sits on the robot.
+struct MountConfig {
+  /// Body (x forward, y left, z up) from camera: place in metres, unit quaternion x y z w. A level camera
+  /// that looks forward.
+  std::array<float, 7> T_body_cam = {0, 0, 0, -0.5f, 0.5f, -0.5f, 0.5f};
+
+  template <class F>
+  static void fields(F&& f) {
+    using P = MountConfig;
+    f("T_body_cam", &P::T_body_cam, -100, 100, "m and quaternion x y z w", "ours",
+      "pose of the camera on the body (x forward, y left, z up)");
+  }
+};
+
+/// Wheel odometry or the like, used where track.prior = "odometry".
+struct OdometryConfig {
+  float max_age_ms = 60;
+  float time_offset_ms = 0;
+  float sigma_m_per_m = 0.05f;
+  float sigma_rad_per_rad = 0.03f;
+  float sigma_rad_per_m = 0.02f;
+
+  template <class F>
+  static void fields(F&& f) {
+    using P = OdometryConfig;
+    f("max_age_ms", &P::max_age_ms, 0, 1e4, "ms", "ours",
+      "older odometry is stale: the motion is predicted without it");
+    f("time_offset_ms", &P::time_offset_ms, -1e4, 1e4, "ms", "ours", "added to the stamps of the odometry");
+    f("sigma_m_per_m", &P::sigma_m_per_m, 0, 10.0, "m/m", "ours", "its error of place, over the way gone");
+    f("sigma_rad_per_rad", &P::sigma_rad_per_rad, 0, 10.0, "rad/rad", "ours",
+      "its error of direction, over the turn");
+    f("sigma_rad_per_m", &P::sigma_rad_per_m, 0, 10.0, "rad/m", "ours",
+      "its error of direction, over the way gone");
   }
 };
 
@@ -91,6 +128,8 @@ struct MemoryConfig {
 struct Config {
   CameraConfig camera;
   SourceConfig source;
+  MountConfig mount;
+  OdometryConfig odometry;
   DepthParams depth;
   TrackParams track;
   MaskParams mask;
@@ -105,6 +144,8 @@ struct Config {
   static void sections(F&& f) {
     f("camera", &Config::camera);
     f("source", &Config::source);
+    f("mount", &Config::mount);
+    f("odometry", &Config::odometry);
     f("depth", &Config::depth);
     f("track", &Config::track);
     f("mask", &Config::mask);

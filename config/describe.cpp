@@ -12,7 +12,7 @@ constexpr const char* kHeading =
     "# \"ours\" marks what the paper leaves open.\n";
 
 template <class T>
-std::string toml_value(const Field& field, T value) {
+std::string toml_value(const Field& field, const T& value) {
   const std::string text = value_text(field, value);
   return std::is_enum_v<T> ? '"' + text + '"' : text;
 }

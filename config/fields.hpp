@@ -2,6 +2,7 @@
 
 // Walks over every setting of a Config: the one loop behind loading, checking and describing.
 
+#include <array>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -24,7 +25,7 @@ struct Field {
 };
 
 /// Calls `f(const Field&, value&)` for each setting of `config` in the order of the files.
-/// `value` is float, int32_t, bool or one of the enums with names.
+/// `value` is float, int32_t, bool, a list of floats or one of the enums with names.
 template <class ConfigT, class F>
 void for_each_field(ConfigT& config, F&& f) {
   Config::sections([&](const char* section, auto section_member) {
@@ -48,6 +49,13 @@ std::string bound_text(double value);
 std::string value_text(const Field& field, float value);
 std::string value_text(const Field& field, int32_t value);
 std::string value_text(const Field& field, bool value);
+/// "[1.0, 2.0]"
+template <size_t N>
+std::string value_text(const Field& field, const std::array<float, N>& values) {
+  std::string text = "[";
+  for (const float value : values) text += (text.size() > 1 ? ", " : "") + value_text(field, value);
+  return text + "]";
+}
 /// The name of a switch's value; its number when it has none.
 template <class Enum>
 requires std::is_enum_v<Enum> std::string value_text(const Field& field, Enum value) {

@@ -6,6 +6,7 @@
 #define TOML_ASSERT(expr) static_assert(true)
 #include <toml++/toml.h>
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <limits>
@@ -65,6 +66,16 @@ Complaint from_toml(const Field& /*field*/, const toml::node& node, bool& out) {
   out = *value;
   return {};
 }
+template <size_t N>
+Complaint from_toml(const Field& field, const toml::node& node, std::array<float, N>& out) {
+  const toml::array* list = node.as_array();
+  std::array<float, N> values = {};
+  if (!list || list->size() != N) return "expected a list of " + std::to_string(N) + " numbers";
+  for (size_t i = 0; i < N; ++i)
+    if (Complaint complaint = from_toml(field, (*list)[i], values[i]); !complaint.empty()) return complaint;
+  out = values;
+  return {};
+}
 template <class Enum>
 Complaint from_toml(const Field& field, const toml::node& node, Enum& out) {
   const auto text = node.value_exact<std::string>();
@@ -92,6 +103,24 @@ Complaint from_text(const Field& /*field*/, std::string_view text, int32_t& out)
 Complaint from_text(const Field& /*field*/, std::string_view text, bool& out) {
   if (text != "true" && text != "false") return "expected true or false";
   out = text == "true";
+  return {};
+}
+/// "1,2,3", or as in a file: "[1, 2, 3]".
+template <size_t N>
+Complaint from_text(const Field& field, std::string_view text, std::array<float, N>& out) {
+  if (text.size() >= 2 && text.front() == '[' && text.back() == ']') text = text.substr(1, text.size() - 2);
+  std::array<float, N> values = {};
+  for (size_t i = 0; i < N; ++i) {
+    const size_t comma = text.find(',');
+    const bool last = i + 1 == N;
+    if ((comma == std::string_view::npos) != last)
+      return "expected " + std::to_string(N) + " numbers with commas between them";
+    std::string_view number = text.substr(0, comma);
+    number.remove_prefix(std::min(number.find_first_not_of(' '), number.size()));
+    if (Complaint complaint = from_text(field, number, values[i]); !complaint.empty()) return complaint;
+    if (!last) text.remove_prefix(comma + 1);
+  }
+  out = values;
   return {};
 }
 template <class Enum>

@@ -1,5 +1,6 @@
 #include "config/validate.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "config/fields.hpp"
@@ -33,6 +34,11 @@ bool in_range(T value, const Field& field) {
     return static_cast<double>(value) >= field.lowest && static_cast<double>(value) <= field.highest;
 }
 
+template <size_t N>
+bool in_range(const std::array<float, N>& values, const Field& field) {
+  return std::all_of(values.begin(), values.end(), [&](float value) { return in_range(value, field); });
+}
+
 void check_ranges(const Config& config, Violations& out) {
   for_each_field(config, [&](const Field& field, const auto& value) {
     if (!in_range(value, field))
@@ -57,6 +63,14 @@ void check_camera(const CameraConfig& camera, Violations& out) {
       {"camera.k2", camera.k2}, {"camera.p1", camera.p1}, {"camera.p2", camera.p2}, {"camera.k3", camera.k3}};
   for (const auto& [name, value] : others)
     out.unless(value == 0, setting(name, value) + ": has no effect while camera.fx is 0; set camera.fx too");
+}
+
+void check_mount(const MountConfig& mount, Violations& out) {
+  constexpr float kRounding = 0.01f;
+  const std::array<float, 7>& T = mount.T_body_cam;
+  const float length = std::sqrt(T[3] * T[3] + T[4] * T[4] + T[5] * T[5] + T[6] * T[6]);
+  out.unless(std::abs(length - 1.0f) <= kRounding,
+             "mount.T_body_cam: the length of the quaternion is " + float_text(length) + ", must be 1");
 }
 
 void check_depth(const Config& config, Violations& out) {
@@ -111,6 +125,7 @@ std::vector<std::string> violations(const Config& config) {
   check_ranges(config, out);
   check_camera(config.camera, out);
   check_source(config.source, out);
+  check_mount(config.mount, out);
   check_depth(config, out);
   check_track(config, out);
   check_map(config.map, out);

@@ -10,9 +10,9 @@ namespace stillmap {
 
 /// What a switch with names can say; the names are in `kNames` in the same order.
 enum class InvalidDepth : uint8_t { ignore, complete };
-enum class MotionPrior : uint8_t { last_pose, constant_velocity };
 enum class RobustKernel : uint8_t { huber, geman_mcclure };
 enum class MaskMethod : uint8_t { residual, parts };
+enum class MotionPrior : uint8_t { last_pose, constant_velocity, odometry };
 
 /// Depth image to metres, paper III-E.
 struct DepthParams {
@@ -63,6 +63,13 @@ struct TrackParams {
   float converged_m = 1e-4f;
   float converged_rad = 1e-4f;
   MotionPrior prior = MotionPrior::constant_velocity;
+  float prior_gain = 0.5f;
+  float prior_fade_s = 0.3f;
+  float prior_forget = 0.1f;
+  float prior_floor_m = 0.002f;
+  float prior_floor_rad = 0.002f;
+  float prior_reach_m = 0.3f;
+  float prior_reach_rad = 0.3f;
   float lost_inlier_ratio = 0.2f;
   float poor_inlier_ratio = 0.4f;
   float inlier_m = 0.03f;
@@ -100,7 +107,20 @@ struct TrackParams {
     f("converged_m", &P::converged_m, 0, 0.1, "m", "ours",
       "a level ends when a step translates and rotates less");
     f("converged_rad", &P::converged_rad, 0, 0.1, "rad", "ours", "see converged_m");
-    f("prior", &P::prior, 0, 1, "last_pose|constant_velocity", "ours", "where the registration starts");
+    f("prior", &P::prior, 0, 2, "last_pose|constant_velocity|odometry", "ours",
+      "where the registration starts; odometry: constant velocity while it is stale");
+    f("prior_gain", &P::prior_gain, 0.01, 1.0, "1", "ours",
+      "share of the newest motion in the velocity that is continued");
+    f("prior_fade_s", &P::prior_fade_s, 0.01, 10.0, "s", "ours",
+      "a continued velocity fades with this time constant: over a gap the prediction goes back to the last "
+      "pose");
+    f("prior_forget", &P::prior_forget, 0.001, 1.0, "a frame", "ours",
+      "how fast past errors of the prediction leave its sigma");
+    f("prior_floor_m", &P::prior_floor_m, 1e-4, 1.0, "m", "ours", "no sigma of the prediction is smaller");
+    f("prior_floor_rad", &P::prior_floor_rad, 1e-4, 1.0, "rad", "ours", "see prior_floor_m");
+    f("prior_reach_m", &P::prior_reach_m, 1e-3, 10.0, "m", "ours",
+      "no sigma is larger, and no prediction farther from the last pose along an axis");
+    f("prior_reach_rad", &P::prior_reach_rad, 1e-3, 3.0, "rad", "ours", "see prior_reach_m");
     f("lost_inlier_ratio", &P::lost_inlier_ratio, 0, 1.0, "1", "ours",
       "lost below this share of points within inlier_m of the map");
     f("poor_inlier_ratio", &P::poor_inlier_ratio, 0, 1.0, "1", "ours", "poor below this share");

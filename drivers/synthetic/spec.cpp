@@ -21,7 +21,7 @@ Error bad_option(std::string_view option) {
   return Error{
       "synthetic: option '" + std::string(option) +
       "' is not known or has no valid value: expected seed=N (0 or more), size=WxH (64x48 to 1920x1080), "
-      "seconds=S (0.1 to 100000), each at most once"};
+      "seconds=S (0.1 to 100000), odometry=0, 1 or slip, each at most once"};
 }
 
 template <class T>
@@ -37,9 +37,16 @@ bool parse_size(std::string_view text, Spec& spec) {
          spec.height >= 48 && spec.height <= 1080;
 }
 
+bool parse_odometry(std::string_view text, Spec& spec) {
+  spec.wheels_slip = text == "slip";
+  spec.odometry = text == "1" || spec.wheels_slip;
+  return spec.odometry || text == "0";
+}
+
 bool parse_option(std::string_view key, std::string_view value, Spec& spec) {
   if (key == "seed") return parse_number(value, spec.seed);
   if (key == "size") return parse_size(value, spec);
+  if (key == "odometry") return parse_odometry(value, spec);
   if (key == "seconds")
     return parse_number(value, spec.seconds) && std::isfinite(spec.seconds) && spec.seconds >= 0.1 &&
            spec.seconds <= 100000.0;

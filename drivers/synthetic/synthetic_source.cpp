@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "drivers/synthetic/odometry.hpp"
 #include "drivers/synthetic/renderer.hpp"
 #include "drivers/synthetic/scene.hpp"
 #include "drivers/synthetic/sensor_model.hpp"
@@ -31,7 +32,8 @@ class SyntheticSource final : public FrameSource {
       : spec_(spec),
         workers_(threads),
         renderer_(xtion(spec.width, spec.height)),
-        sensor_(xtion(spec.width, spec.height), kDepthUnitsPerM, spec.seed) {
+        sensor_(xtion(spec.width, spec.height), kDepthUnitsPerM, spec.seed),
+        odometry_(*spec.scene, spec.seed, spec.wheels_slip) {
     info_.name = "synthetic:" + text;
     info_.camera.k = xtion(spec.width, spec.height);
     info_.depth_units_per_m = kDepthUnitsPerM;
@@ -70,6 +72,8 @@ class SyntheticSource final : public FrameSource {
 
   void skip(uint32_t count) override { next_ = std::min<int64_t>(next_ + count, info_.frames); }
 
+  OdometryPort* odometry() override { return spec_.odometry ? &odometry_ : nullptr; }
+
   const std::string& error() const override { return error_; }
 
  private:
@@ -92,6 +96,7 @@ class SyntheticSource final : public FrameSource {
   synthetic::Workers workers_;
   synthetic::Renderer renderer_;
   synthetic::SensorModel sensor_;
+  synthetic::WheelOdometry odometry_;
   synthetic::IdealImages images_;
   std::string error_;
   int64_t next_ = 0;

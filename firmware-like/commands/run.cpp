@@ -108,7 +108,7 @@ int run(const RunOptions& o, FrameObserver* observer) {
 
   if (observer) observer->begin(source, info);
   FrameSlot slot(info);
-  Pipeline pipeline(*engine, config, plan->T_map_cam);
+  Pipeline pipeline(*engine, config, plan->T_map_cam, source.odometry());
   Progress progress(frames, o.quiet);
   const LoopEnd end =
       run_loop(source, *engine, pipeline, **outputs, progress, slot.frame(), o.max_frames, observer);

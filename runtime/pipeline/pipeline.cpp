@@ -51,8 +51,8 @@ const char* to_string(TrackingState state) {
   return "unknown";
 }
 
-Pipeline::Pipeline(Engine& engine, const Config& config, const Se3d& T_map_cam)
-    : engine_(engine), config_(config), T_map_cam_(T_map_cam), T_map_cam_before_(T_map_cam) {}
+Pipeline::Pipeline(Engine& engine, const Config& config, const Se3d& T_map_cam, OdometryPort* odometry)
+    : engine_(engine), config_(config), predictor_(config, T_map_cam, odometry), T_map_cam_(T_map_cam) {}
 
 FrameResult Pipeline::process(const RgbdFrame& frame) {
   StopWatch total, watch;
@@ -86,7 +86,7 @@ FrameResult Pipeline::start_map(FrameResult result) {
 /// Paper Fig. 2: initial pose, dynamics from its residuals, refined pose, integration.
 FrameResult Pipeline::track_and_map(FrameResult result) {
   StopWatch watch;
-  const TrackResult initial = engine_.track(cast<float>(predicted(result.stamp)));
+  const TrackResult initial = engine_.track(cast<float>(predictor_.predict(result.stamp).T_map_cam));
   result.ms.track_ms = watch.lap_ms();
   const MaskResult mask = engine_.mask(initial.T_world_cam);
   result.ms.mask_ms = watch.lap_ms();
@@ -112,17 +112,6 @@ FrameResult Pipeline::track_and_map(FrameResult result) {
   return result;
 }
 
-/// Where the registration starts (DESIGN section 5): the last pose, or the last motion continued.
-Se3d Pipeline::predicted(Stamp stamp) const {
-  if (config_.track.prior == MotionPrior::last_pose || !have_motion_ || lost_) return T_map_cam_;
-  const double before_s = static_cast<double>(stamp_.ns - stamp_before_.ns) * 1e-9;
-  const double ahead_s = static_cast<double>(stamp.ns - stamp_.ns) * 1e-9;
-  if (before_s <= 0 || ahead_s <= 0) return T_map_cam_;
-  const double scale = std::min(ahead_s / before_s, 2.0);  // a gap is no reason to leap
-  const Twistd motion = log(inverse(T_map_cam_before_) * T_map_cam_);
-  return T_map_cam_ * exp(Twistd{scale * motion.v, scale * motion.w});
-}
-
 void Pipeline::remember(const FrameResult& result) {
   ++counters_.frames;
   if (result.status != Status::ok) {
@@ -132,12 +121,13 @@ void Pipeline::remember(const FrameResult& result) {
   const bool lost = result.state == TrackingState::lost;
   if (lost) ++counters_.lost_frames;
   if (lost_ && !lost) ++counters_.relocalised;
-  have_motion_ = counters_.frames - counters_.bad_frames > 1 && !lost && !lost_;
+  // While lost the last pose stays what it was: the time since then tells the predictor enough.
+  if (!lost && lost_)
+    predictor_.restart(result.stamp, result.T_map_cam);
+  else if (!lost)
+    predictor_.update(result.stamp, result.T_map_cam);
   lost_ = lost;
-  T_map_cam_before_ = T_map_cam_;
-  stamp_before_ = stamp_;
   T_map_cam_ = result.T_map_cam;
-  stamp_ = result.stamp;
 }
 
 }  // namespace stillmap

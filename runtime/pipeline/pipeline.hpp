@@ -6,6 +6,7 @@
 
 #include "config/config.hpp"
 #include "kernels/engine.hpp"
+#include "runtime/pipeline/motion_predictor.hpp"
 #include "runtime/ports/frame_source.hpp"
 
 namespace stillmap {
@@ -45,7 +46,9 @@ struct PipelineCounters {
 class Pipeline {
  public:
   /// @param T_map_cam pose of the first frame (identity unless --initial-pose)
-  Pipeline(Engine& engine, const Config& config, const Se3d& T_map_cam = {});
+  /// @param odometry used where track.prior asks for it; may be null; outlives the pipeline
+  Pipeline(Engine& engine, const Config& config, const Se3d& T_map_cam = {},
+           OdometryPort* odometry = nullptr);
 
   FrameResult process(const RgbdFrame& frame);
 
@@ -54,17 +57,14 @@ class Pipeline {
  private:
   FrameResult start_map(FrameResult result);
   FrameResult track_and_map(FrameResult result);
-  Se3d predicted(Stamp stamp) const;
   void remember(const FrameResult& result);
 
   Engine& engine_;
   Config config_;
   PipelineCounters counters_;
-  Se3d T_map_cam_;         ///< last pose
-  Se3d T_map_cam_before_;  ///< the pose before it
-  Stamp stamp_, stamp_before_;
+  MotionPredictor predictor_;
+  Se3d T_map_cam_;  ///< last pose
   bool have_map_ = false;
-  bool have_motion_ = false;
   bool lost_ = false;
 };
 

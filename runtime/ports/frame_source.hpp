@@ -41,6 +41,8 @@ struct SourceInfo {
   bool has_truth_mask = false;
 };
 
+class OdometryPort;
+
 /// @thread open: boot; next: one reader thread
 class FrameSource {
  public:
@@ -57,6 +59,9 @@ class FrameSource {
   /// Points of the true static surface (as it is at the end), source's world, metres; empty where unknown.
   /// @thread boot
   virtual std::vector<Vec3> truth_cloud() const { return {}; }
+
+  /// Odometry that comes with the frames; null where there is none. Lives as long as the source.
+  virtual OdometryPort* odometry() { return nullptr; }
 
   /// Passes over `count` frames without decoding them.
   virtual void skip(uint32_t count) = 0;

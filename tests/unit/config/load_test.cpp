@@ -78,10 +78,35 @@ TEST(Load, NumbersThatAreNotFiniteOrDoNotFitAreErrors) {
 }
 
 TEST(Load, ListsEveryProblemOfAFile) {
-  const std::string error = error_of("[track]\nlevles = 2\nprior = \"odometry\"\n[maps]\n");
+  const std::string error = error_of("[track]\nlevles = 2\nprior = \"wheels\"\n[maps]\n");
   EXPECT_TRUE(contains(error, "track.levles")) << error;
   EXPECT_TRUE(contains(error, "track.prior")) << error;
   EXPECT_TRUE(contains(error, "maps")) << error;
+}
+
+TEST(Load, ListsHaveTheirLength) {
+  const Result<Config> config = parse_config("[mount]\nT_body_cam = [0.1, 2, 3, 0, 0, 0, 1]\n", "test.toml");
+  ASSERT_TRUE(config) << config.error();
+  EXPECT_EQ(config->mount.T_body_cam, (std::array<float, 7>{0.1f, 2, 3, 0, 0, 0, 1}));
+  for (const char* list : {"[0, 0, 0, 0, 0, 1]", "[0, 0, 0, 0, 0, 0, 0, 1]", "3", "[0, 0, 0, 0, 0, 0, nan]",
+                           "[0, 0, 0, 0, 0, 0, \"1\"]"}) {
+    const std::string error = error_of(std::string("[mount]\nT_body_cam = ") + list);
+    EXPECT_TRUE(contains(error, "mount.T_body_cam: expected")) << list << error;
+  }
+}
+
+TEST(ApplySetting, TakesLists) {
+  Config config;
+  for (const char* text : {"1,2,3,0,0,0,1", "[1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0]"}) {
+    config.mount = {};
+    const Result<Done> done = apply_setting(config, std::string("mount.T_body_cam=") + text);
+    EXPECT_TRUE(done) << done.error();
+    EXPECT_EQ(config.mount.T_body_cam, (std::array<float, 7>{1, 2, 3, 0, 0, 0, 1})) << text;
+  }
+  for (const char* text :
+       {"", "1,2,3", "1,2,3,0,0,0,1,", "1,2,3,0,0,0,1,2", "[1,2,3,0,0,0,1", "1,,3,0,0,0,1"})
+    EXPECT_FALSE(apply_setting(config, std::string("mount.T_body_cam=") + text)) << text;
+  EXPECT_EQ(config.mount.T_body_cam[0], 1.0f);
 }
 
 TEST(Load, BrokenTomlNamesFileAndLine) {

@@ -132,7 +132,7 @@ TEST(Describe, SaysUnitRangePaperAndPurpose) {
   const std::string text = to_toml(Config{});
   EXPECT_NE(text.find("gamma = 0.5                    # 0 to 1; Tab. I, Eq. (5); a squared residual"),
             std::string::npos);
-  EXPECT_NE(text.find("prior = \"constant_velocity\"    # last_pose|constant_velocity; ours;"),
+  EXPECT_NE(text.find("prior = \"constant_velocity\"    # last_pose|constant_velocity|odometry; ours;"),
             std::string::npos);
   EXPECT_NE(text.find("# true or false; III-C; false: everything"), std::string::npos);
 }

@@ -72,6 +72,11 @@ TEST(Validate, EveryRangeIsChecked) {
   EXPECT_GT(checked, 60);
 }
 
+TEST(Validate, TheMountIsAPose) {
+  EXPECT_TRUE(mentions(after([](Config& c) { c.mount.T_body_cam[6] = 3; }),
+                       "mount.T_body_cam: the length of the quaternion"));
+}
+
 TEST(Validate, EndsOfARangeAreAllowed) {
   EXPECT_TRUE(after([](Config& c) { c.depth.min_m = 0.01f; }).empty());
   EXPECT_TRUE(after([](Config& c) { c.map.high_water = 0.1f; }).empty());
