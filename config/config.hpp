@@ -135,6 +135,7 @@ struct Config {
   MaskParams mask;
   IntegrateParams integrate;
   MapParams map;
+  RelocaliseParams relocalise;
   RecordConfig record;
   RuntimeConfig runtime;
   MemoryConfig memory;
@@ -151,6 +152,7 @@ struct Config {
     f("mask", &Config::mask);
     f("integrate", &Config::integrate);
     f("map", &Config::map);
+    f("relocalise", &Config::relocalise);
     f("record", &Config::record);
     f("runtime", &Config::runtime);
     f("memory", &Config::memory);

@@ -22,6 +22,7 @@ struct EngineParams {
   MaskParams mask;
   IntegrateParams integrate;
   MapParams map;
+  RelocaliseParams relocalise;
   int32_t threads = 2;  ///< CPU engine: 1..64, the calling thread included
 };
 
@@ -86,6 +87,29 @@ struct IntegrateResult {
   uint32_t visible_blocks = 0;  ///< blocks looked at in this frame
 };
 
+/// How a frame fits the map at a pose, over the cells of its small view (kernels/relocalise). Shares are of
+/// the cells that say something.
+struct ViewCheck {
+  int32_t cells = 0;              ///< that say something
+  float on = 0;                   ///< on a mapped surface
+  float front = 0;                ///< before one, in free space: a mover, or a wrong pose
+  float through = 0;              ///< behind one: contradicts the pose
+  float unknown = 0;              ///< where the map knows nothing
+  float luma_correlation = 0;     ///< of measured and mapped luminance over the cells `on`, -1..1
+  float texture_correlation = 0;  ///< the same of the differences between neighbouring cells
+  float weakest_m = 0;  ///< standard deviation of the worst bound direction for 1 cm of noise in every cell
+};
+
+/// An answer of the search for a lost camera.
+struct PlaceResult {
+  Status status =
+      Status::unavailable;  ///< ok: the frame fits the map at this pose; unavailable: found nothing
+  Se3 T_map_cam;            ///< best try, also when it does not fit
+  ViewCheck check;          ///< of that try
+  float similarity = 0;     ///< of the most similar keyframe, 0..1
+  int32_t keyframes = 0;    ///< in store
+};
+
 /// Receives a mesh as it is extracted: first the counts, then all vertices in order, then all triangles.
 /// A false answer stops the extraction.
 class MeshSink {
@@ -115,6 +139,14 @@ class Engine {
   /// Allocates on unmasked rays, fuses, carves (paper III-A, III-D).
   virtual IntegrateResult integrate(const Se3& T_world_cam) = 0;
 
+  /// Keeps the last prepared frame as a keyframe when it shows something new. Masked pixels have no say.
+  virtual void remember_place(const Se3& T_map_cam) = 0;
+  /// Looks for the pose of the last prepared frame: relocalise.tries keyframes and, at attempt 0, the guess.
+  /// @param attempt counts up from 0 while lost: every attempt tries other keyframes
+  virtual PlaceResult find_place(const Se3& T_map_cam_guess, int32_t attempt) = 0;
+  /// The same from one pose near by (some 20 degrees and 30 cm), without keyframes.
+  virtual PlaceResult confirm_place(const Se3& T_map_cam_start) = 0;
+
   /// The map seen from any pose: depth in metres (0: nothing) and colour; both images of the size of `k`.
   virtual Status raycast(const Se3& T_world_cam, const Intrinsics& k, ImageView<float> depth_m,
                          ImageView<Rgb8> colour) = 0;
@@ -128,7 +160,7 @@ class Engine {
   /// Undistorted colour of the last prepared frame.
   virtual ImageView<const Rgb8> colour_image() const = 0;
   virtual MapHealth map_health() const = 0;
-  /// Forgets the map; memory stays.
+  /// Forgets the map and its keyframes; memory stays.
   virtual void reset_map() = 0;
 };
 

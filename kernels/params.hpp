@@ -225,4 +225,56 @@ struct MapParams {
   }
 };
 
+/// Finding a lost camera again in the known map.
+struct RelocaliseParams {
+  bool enabled = true;
+  float blind_s = 0.2f;
+  int32_t ferns = 512;
+  int32_t max_keyframes = 256;
+  float keyframe_similarity = 0.8f;
+  float keyframe_m = 0.25f;
+  float keyframe_deg = 12.0f;
+  int32_t candidates = 16;
+  int32_t tries = 4;
+  int32_t confirm_frames = 2;
+  float min_on = 0.25f;
+  float max_through = 0.025f;
+  float max_front = 0.75f;
+  float max_unknown = 0.35f;
+  float min_luma_correlation = 0.85f;
+  float min_texture_correlation = 0.65f;
+  float max_weakest_m = 0.1f;
+
+  template <class F>
+  static void fields(F&& f) {
+    using P = RelocaliseParams;
+    f("enabled", &P::enabled, 0, 1, "bool", "ours",
+      "false: a lost camera is only tracked on from its last pose");
+    f("blind_s", &P::blind_s, 0.03, 100, "s", "ours",
+      "a longer stretch without a usable frame is a loss: the camera may be anywhere");
+    f("ferns", &P::ferns, 32, 4096, "ferns", "ours", "of four tests each, the code of a keyframe");
+    f("max_keyframes", &P::max_keyframes, 2, 4096, "keyframes", "ours",
+      "fixed at boot; then the most redundant one is replaced");
+    f("keyframe_similarity", &P::keyframe_similarity, 0, 1.0, "share", "ours",
+      "a frame that shares fewer ferns with every keyframe becomes one");
+    f("keyframe_m", &P::keyframe_m, 0.01, 10.0, "m", "ours",
+      "or that was taken farther from all similar ones");
+    f("keyframe_deg", &P::keyframe_deg, 1.0, 180.0, "degrees", "ours", "or turned farther");
+    f("candidates", &P::candidates, 1, 64, "keyframes", "ours", "the most similar ones that are tried");
+    f("tries", &P::tries, 1, 8, "keyframes", "ours", "of these in one frame; the others in the next ones");
+    f("confirm_frames", &P::confirm_frames, 0, 30, "frames", "ours",
+      "that must fit as well before a found pose is believed");
+    f("min_on", &P::min_on, 0, 1.0, "share", "ours", "of the cells that lie on the map");
+    f("max_through", &P::max_through, 0, 1.0, "share", "ours", "of the cells seen through a mapped surface");
+    f("max_front", &P::max_front, 0, 1.0, "share", "ours", "of the cells before the map: movers");
+    f("max_unknown", &P::max_unknown, 0, 1.0, "share", "ours", "of the cells where the map knows nothing");
+    f("min_luma_correlation", &P::min_luma_correlation, -1.0, 1.0, "1", "ours",
+      "of measured and mapped luminance");
+    f("min_texture_correlation", &P::min_texture_correlation, -1.0, 1.0, "1", "ours",
+      "of their differences between neighbouring cells");
+    f("max_weakest_m", &P::max_weakest_m, 1e-3, 10.0, "m", "ours",
+      "deviation of the least bound direction of the pose for 1 cm of noise");
+  }
+};
+
 }  // namespace stillmap

@@ -136,6 +136,15 @@ uint8_t to_byte(float v) {
 
 }  // namespace
 
+void cover_lens(IdealImages& images) {
+  constexpr float kHand_m = 0.03f;
+  constexpr Rgb8 kDarkRed = {26, 9, 7};
+  std::fill(images.depth_m.begin(), images.depth_m.end(), kHand_m);
+  std::fill(images.cos_incidence.begin(), images.cos_incidence.end(), 1.0f);
+  std::fill(images.colour.begin(), images.colour.end(), kDarkRed);
+  std::fill(images.mask.begin(), images.mask.end(), uint8_t{255});
+}
+
 /// Nearest shape of every pixel of one tile.
 struct Renderer::Hits {
   int32_t row0, col0, rows, cols;

@@ -21,6 +21,9 @@ struct IdealImages {
   std::vector<uint8_t> mask;  ///< 255: the visible surface moves
 };
 
+/// What a camera sees with a hand on its lens: dark, nearer than it can measure, all of it moving.
+void cover_lens(IdealImages& images);
+
 /// Ray caster: tiles, each with the shapes whose outline touches it.
 /// @thread one caller at a time
 class Renderer {

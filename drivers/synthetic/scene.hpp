@@ -67,6 +67,7 @@ struct Scene {
   void (*still)(World& world);
   void (*movers)(double t_s, World& world);
   Se3d (*camera)(double t_s);
+  bool (*covered)(double t_s) = nullptr;  ///< a hand lies on the lens; null: never
 };
 
 /// @return null when there is no such scene (names without "-static").

@@ -475,6 +475,33 @@ void synchronous_movers(double t, World& world) {
   }
 }
 
+// ---- a hand on the lens
+
+/// Sees the whole east half of the room within the first 6 s, then again and again.
+Se3d looking_about_camera(double t) {
+  static const Sway sway = {{-1.05, 0.0, 1.36}, {0.22, 0.48, 0.07}, {6.4, 6.4, 4.4}, 0, 30, 6.4, -6, 3, 4.7};
+  return sway_camera(sway, t);
+}
+
+/// For three seconds, in which the camera turns from one end of its view to the other.
+bool hand_on_lens(double t) {
+  return t >= 9.0 && t < 12.0;
+}
+
+constexpr double kFirstKidnapping = 6.0, kSecondKidnapping = 10.0, kCarried = 0.35;
+
+/// Carried off while covered, to where it was four seconds before.
+Se3d kidnapped_camera(double t) {
+  const double half = 0.5 * kCarried;
+  const int jumps = (t >= kFirstKidnapping + half ? 1 : 0) + (t >= kSecondKidnapping + half ? 1 : 0);
+  return looking_about_camera(t - 4.0 * jumps);
+}
+
+bool carried_off(double t) {
+  return (t >= kFirstKidnapping && t < kFirstKidnapping + kCarried) ||
+         (t >= kSecondKidnapping && t < kSecondKidnapping + kCarried);
+}
+
 }  // namespace
 
 const std::vector<Scene>& all_scenes() {
@@ -494,7 +521,9 @@ const std::vector<Scene>& all_scenes() {
       {"synchronous", 12, true, bare_room, synchronous_movers, synchronous_camera},
       {"kidnapping_box", 14, true, bare_with_kidnapping_table, kidnapping_movers, moving_box_camera},
       {"loop", 20, false, furnished_room, no_movers, loop_camera},
-      {"fast", 10, false, furnished_room, no_movers, fast_camera}};
+      {"fast", 10, false, furnished_room, no_movers, fast_camera},
+      {"covered", 16, false, furnished_room, no_movers, looking_about_camera, hand_on_lens},
+      {"camera_kidnapped", 14, false, furnished_room, no_movers, kidnapped_camera, carried_off}};
   return scenes;
 }
 

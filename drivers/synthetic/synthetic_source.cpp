@@ -58,6 +58,7 @@ class SyntheticSource final : public FrameSource {
     const Se3d T_world_cam = spec_.scene->camera(t_s);
     renderer_.render(synthetic::world_at(*spec_.scene, t_s, spec_.without_movers), T_world_cam, workers_,
                      images_);
+    if (spec_.scene->covered != nullptr && spec_.scene->covered(t_s)) synthetic::cover_lens(images_);
     sensor_.measure(images_, index, t_s, workers_, frame.depth_raw, frame.colour);
     if (frame.truth_mask.data != nullptr) copy_mask(frame.truth_mask);
     frame.truth_T_world_cam = T_world_cam;

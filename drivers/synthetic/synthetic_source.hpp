@@ -18,10 +18,10 @@ namespace stillmap {
 /// 1920x1080; the lens is the Xtion's (fx = fy = 525 at 640 columns, no distortion). The same spec gives the
 /// same bytes, with any number of threads. Past a scene's own length people go on walking and boxes stay
 /// where they are. Frames carry truth_T_world_cam and, where the caller gives memory for it, truth_mask: 255
-/// where the visible surface moves; a carried box is dynamic until it rests. World: z up, origin on the
-/// floor, metres. `odometry=1` adds noisy odometry of a body that carries the camera level (see
-/// odometry.hpp), `odometry=slip` wheels that slip at times. An error of `next` is answered with bad_data:
-/// the caller's images have another size than the source.
+/// where the visible surface moves; a carried box is dynamic until it rests, a hand on the lens is the whole
+/// view (in twins as well). World: z up, origin on the floor, metres. `odometry=1` adds noisy odometry of a
+/// body that carries the camera level (see odometry.hpp), `odometry=slip` wheels that slip at times. An error
+/// of `next` is answered with bad_data: the caller's images have another size than the source.
 /// @param threads 1..64 render a frame, the caller of `next` included
 /// @return an error that lists the valid scenes or options   @thread boot
 Result<std::unique_ptr<FrameSource>> open_synthetic(const std::string& spec, int threads = 2);

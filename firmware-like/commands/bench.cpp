@@ -11,6 +11,7 @@ namespace {
 int bench(const BenchOptions& o) {
   if (o.what == "steps") return bench_steps(o);
   if (o.what == "accuracy") return bench_accuracy(o);
+  if (o.what == "relocalise") return bench_relocalise(o);
   return fail("bench " + o.what + ": this part is not in this build", ErrorKind::bad_usage);
 }
 
@@ -19,8 +20,8 @@ int bench(const BenchOptions& o) {
 void add_bench(CLI::App& app, int& exit_code) {
   CLI::App* command = app.add_subcommand("bench", "how fast and how accurate this build is on this machine");
   auto o = std::make_shared<BenchOptions>();
-  command->add_option("WHAT", o->what, "steps, accuracy, scale or soak")
-      ->check(CLI::IsMember({"steps", "accuracy", "scale", "soak"}))
+  command->add_option("WHAT", o->what, "steps, accuracy, relocalise, scale or soak")
+      ->check(CLI::IsMember({"steps", "accuracy", "relocalise", "scale", "soak"}))
       ->capture_default_str();
   command->add_flag("--json", o->json, "machine-readable");
   command->add_option("--config", o->configs, "TOML file; accuracy: may be repeated, without it both presets")
@@ -43,6 +44,10 @@ void add_bench(CLI::App& app, int& exit_code) {
   command->add_option("--skip-frames", o->skip_frames, "accuracy: pass over the first frames of recordings");
   command->add_option("--max-frames", o->max_frames,
                       "accuracy: stop recordings after so many frames (0: all)");
+  command->add_option("--seed", o->seed, "relocalise: another draw of places")
+      ->check(CLI::Range(0, 1000000))
+      ->capture_default_str();
+  command->add_flag("--brief", o->brief, "relocalise: one scene, few places");
   command->add_option("--out", o->out, "accuracy: where tables and runs are left; meshes only with one seed")
       ->capture_default_str();
   command->callback([o, &exit_code] { exit_code = bench(*o); });

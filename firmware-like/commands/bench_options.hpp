@@ -17,6 +17,8 @@ struct BenchOptions {
   std::string seconds;                       ///< of synthetic scenes; "": as they say
   bool twins = false;                        ///< with each dynamic scene named by --source its static twin
   uint32_t skip_frames = 0, max_frames = 0;  ///< of recordings
+  int32_t seed = 1;
+  bool brief = false;
   bool json = false;
 };
 
@@ -25,5 +27,8 @@ int bench_steps(const BenchOptions& options);
 
 /// Both presets against truth on the synthetic scenes, and on recordings. @return the exit code
 int bench_accuracy(const BenchOptions& options);
+
+/// Kidnappings to seen and unseen places. @return the exit code; failed when a bar is missed
+int bench_relocalise(const BenchOptions& options);
 
 }  // namespace stillmap

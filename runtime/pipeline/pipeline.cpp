@@ -52,7 +52,11 @@ const char* to_string(TrackingState state) {
 }
 
 Pipeline::Pipeline(Engine& engine, const Config& config, const Se3d& T_map_cam, OdometryPort* odometry)
-    : engine_(engine), config_(config), predictor_(config, T_map_cam, odometry), T_map_cam_(T_map_cam) {}
+    : engine_(engine),
+      config_(config),
+      relocaliser_(engine, config.relocalise),
+      predictor_(config, T_map_cam, odometry),
+      T_map_cam_(T_map_cam) {}
 
 FrameResult Pipeline::process(const RgbdFrame& frame) {
   StopWatch total, watch;
@@ -60,12 +64,19 @@ FrameResult Pipeline::process(const RgbdFrame& frame) {
   result.stamp = frame.depth_stamp;
   result.sequence = frame.sequence;
   result.T_map_cam = T_map_cam_;
+  lost_ = lost_ || blind_too_long(frame.depth_stamp);
   result.state = lost_ ? TrackingState::lost : TrackingState::good;
 
   const PrepareResult prepared = engine_.prepare({frame.depth_raw, frame.colour});
   result.status = prepared.status;
   result.ms.prepare_ms = watch.lap_ms();
-  if (prepared.status == Status::ok) result = have_map_ ? track_and_map(result) : start_map(result);
+  if (prepared.status == Status::ok) {
+    if (!have_map_)
+      result = start_map(result);
+    else
+      result = lost_ && relocaliser_.enabled() ? find_again(result) : track_and_map(result);
+    if (result.state == TrackingState::good) relocaliser_.remember(result.T_map_cam);
+  }
   result.map = engine_.map_health();
   result.ms.total_ms = total.total_ms();
   remember(result);
@@ -112,14 +123,36 @@ FrameResult Pipeline::track_and_map(FrameResult result) {
   return result;
 }
 
+/// While lost nothing is mapped; a pose that is believed is tracked on from in the same frame.
+FrameResult Pipeline::find_again(FrameResult result) {
+  StopWatch watch;
+  const std::optional<Se3d> found = relocaliser_.find(T_map_cam_);
+  if (!found) {
+    result.ms.track_ms = watch.lap_ms();
+    return result;
+  }
+  result.T_map_cam = T_map_cam_ = *found;
+  predictor_.restart(result.stamp, *found);
+  return track_and_map(result);
+}
+
+/// Without a usable frame for so long, the camera may be anywhere. Sources that are slow by nature are not
+/// blind.
+bool Pipeline::blind_too_long(Stamp stamp) const {
+  constexpr int64_t kPeriods = 3;
+  const int64_t blind_ns = stamp.ns - stamp_.ns;
+  return relocaliser_.enabled() && frame_period_ns_ > 0 && blind_ns > kPeriods * frame_period_ns_ &&
+         static_cast<double>(blind_ns) * 1e-9 > static_cast<double>(config_.relocalise.blind_s);
+}
+
 void Pipeline::remember(const FrameResult& result) {
   ++counters_.frames;
+  const bool lost = result.state == TrackingState::lost;
+  if (lost) ++counters_.lost_frames;
   if (result.status != Status::ok) {
     ++counters_.bad_frames;
     return;
   }
-  const bool lost = result.state == TrackingState::lost;
-  if (lost) ++counters_.lost_frames;
   if (lost_ && !lost) ++counters_.relocalised;
   // While lost the last pose stays what it was: the time since then tells the predictor enough.
   if (!lost && lost_)
@@ -127,6 +160,10 @@ void Pipeline::remember(const FrameResult& result) {
   else if (!lost)
     predictor_.update(result.stamp, result.T_map_cam);
   lost_ = lost;
+  const int64_t period_ns = result.stamp.ns - stamp_.ns;
+  if (counters_.frames - counters_.bad_frames > 1 && period_ns > 0)
+    frame_period_ns_ = frame_period_ns_ > 0 ? std::min(frame_period_ns_, period_ns) : period_ns;
+  stamp_ = result.stamp;
   T_map_cam_ = result.T_map_cam;
 }
 

@@ -7,6 +7,7 @@
 #include "config/config.hpp"
 #include "kernels/engine.hpp"
 #include "runtime/pipeline/motion_predictor.hpp"
+#include "runtime/pipeline/relocaliser.hpp"
 #include "runtime/ports/frame_source.hpp"
 
 namespace stillmap {
@@ -38,7 +39,7 @@ struct FrameResult {
 struct PipelineCounters {
   uint32_t frames = 0;  ///< processed, bad ones included
   uint32_t bad_frames = 0;
-  uint32_t lost_frames = 0;
+  uint32_t lost_frames = 0;  ///< bad ones included
   uint32_t relocalised = 0;  ///< returns from lost
 };
 
@@ -57,13 +58,18 @@ class Pipeline {
  private:
   FrameResult start_map(FrameResult result);
   FrameResult track_and_map(FrameResult result);
+  FrameResult find_again(FrameResult result);
+  bool blind_too_long(Stamp stamp) const;
   void remember(const FrameResult& result);
 
   Engine& engine_;
   Config config_;
+  Relocaliser relocaliser_;
   PipelineCounters counters_;
   MotionPredictor predictor_;
-  Se3d T_map_cam_;  ///< last pose
+  Se3d T_map_cam_;               ///< last pose
+  Stamp stamp_;                  ///< of the last usable frame
+  int64_t frame_period_ns_ = 0;  ///< shortest between two usable frames, 0: not known yet
   bool have_map_ = false;
   bool lost_ = false;
 };

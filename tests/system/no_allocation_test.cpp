@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <malloc.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdlib>
 #include <memory>
@@ -107,6 +108,33 @@ TEST(Pipeline, DoesNotAllocateIn300FramesWorkersIncluded) {
   EXPECT_EQ(allocations, 0u);
   EXPECT_EQ(pipeline.counters().frames, 300u);
   EXPECT_GT(engine->map_health().blocks, 100u);  // it did map
+}
+
+TEST(Pipeline, DoesNotAllocateWhileLostAndFindingItselfAgain) {
+  Config config;
+  config.map.pool_blocks = 20000;
+  config.map.voxel_m = 0.02f;
+  auto source = open_source("synthetic:static,size=160x120,seconds=3", SourceOptions{});
+  ASSERT_TRUE(source) << source.error();
+  const SourceInfo& info = (*source)->info();
+  const std::unique_ptr<Engine> engine =
+      make_cpu_engine(engine_params(config, info.camera, info.depth_units_per_m));
+  ASSERT_NE(engine, nullptr);
+  std::vector<uint16_t> depth(160 * 120);
+  std::vector<Rgb8> colour(160 * 120);
+  RgbdFrame frame;
+  frame.depth_raw = {depth.data(), 120, 160, 160};
+  frame.colour = {colour.data(), 120, 160, 160};
+  Pipeline pipeline(*engine, config);
+  uint64_t allocations = 0;
+  for (int i = 0; i < 80; ++i) {
+    ASSERT_EQ((*source)->next(frame, 1000), Status::ok) << (*source)->error();
+    if (i >= 50 && i < 60) std::fill(depth.begin(), depth.end(), uint16_t{0});
+    allocations += allocations_of([&] { pipeline.process(frame); });
+  }
+  EXPECT_EQ(allocations, 0u);
+  EXPECT_GE(pipeline.counters().lost_frames, 3u);
+  EXPECT_EQ(pipeline.counters().relocalised, 1u);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "kernels/backend/cpu/loops.hpp"
 #include "kernels/backend/cpu/map_storage.hpp"
 #include "kernels/backend/cpu/raycast.hpp"
+#include "kernels/backend/cpu/relocalise.hpp"
 #include "kernels/backend/cpu/thread_pool.hpp"
 #include "kernels/engine.hpp"
 #include "kernels/mask/grow_mask.hpp"
@@ -76,6 +77,7 @@ struct CpuMemory {
   View<VisibleBlock> visible;
   View<uint8_t> extract_scratch, raycast_scratch;
   MapStorage map;
+  CpuRelocaliser relocaliser;
 
   void carve(Arena& arena, const EngineParams& p) {
     const int32_t rows = p.camera.k.height, cols = p.camera.k.width;
@@ -99,6 +101,7 @@ struct CpuMemory {
                                           extract_scratch_bytes(static_cast<uint32_t>(p.map.pool_blocks)));
     raycast_scratch = arena.take<uint8_t>("mesh and views", raycast_scratch_bytes());
     map.carve(arena, p.map);
+    relocaliser.carve(arena, p);
   }
 
  private:
@@ -154,6 +157,15 @@ class CpuEngine final : public Engine {
     return register_to_map(T_world_cam_start, memory_.trust, {params_.track.levels - 1, 0});
   }
   IntegrateResult integrate(const Se3& T_world_cam) override;
+  void remember_place(const Se3& T_map_cam) override {
+    memory_.relocaliser.remember(prepared_view(), T_map_cam);
+  }
+  PlaceResult find_place(const Se3& T_map_cam_guess, int32_t attempt) override {
+    return memory_.relocaliser.find(prepared_view(), memory_.map.view(), T_map_cam_guess, attempt, pool_);
+  }
+  PlaceResult confirm_place(const Se3& T_map_cam_start) override {
+    return memory_.relocaliser.confirm(prepared_view(), memory_.map.view(), T_map_cam_start, pool_);
+  }
   Status raycast(const Se3& T_world_cam, const Intrinsics& k, ImageView<float> depth_m,
                  ImageView<Rgb8> colour) override {
     return stillmap::raycast({memory_.map.view(), k, T_world_cam, depth_m, colour}, memory_.raycast_scratch,
@@ -167,10 +179,14 @@ class CpuEngine final : public Engine {
   ImageView<const float> depth_image_m() const override { return memory_.depth_m; }
   ImageView<const Rgb8> colour_image() const override { return memory_.colour; }
   MapHealth map_health() const override { return memory_.map.health(); }
-  void reset_map() override { memory_.map.clear(); }
+  void reset_map() override {
+    memory_.map.clear();
+    memory_.relocaliser.clear();
+  }
 
  private:
   const Intrinsics& k() const { return params_.camera.k; }
+  PreparedView prepared_view() const { return {memory_.depth_m, memory_.luma_chroma, memory_.mask}; }
   void fill_source_pixels();
   TrackPass track_pass(const Se3& T_map_cam) const;
   TrackResult register_to_map(const Se3& T_start, ImageView<const uint8_t> trust, LevelRange levels);

@@ -56,6 +56,7 @@ Pace pace_of(const Scene& scene) {
   Pace pace;
   const int frames = static_cast<int>(scene.default_seconds * 30.0) - 1;
   for (int i = 0; i < frames; ++i) {
+    if (scene.covered != nullptr && scene.covered((i + 1) * kFrame_s)) continue;  // it may be carried off
     const Se3d a = scene.camera(i * kFrame_s), b = scene.camera((i + 1) * kFrame_s);
     const double metres = norm(b.translation - a.translation), degrees = degrees_between(a, b);
     pace.m_per_s += metres * 30.0 / frames;
@@ -244,6 +245,36 @@ TEST(Scenes, synchronous_people_stay_where_they_are_in_the_view) {
       EXPECT_LT(norm(moved_cam), 0.09f) << t;  // the hand's unrest and the nodding of the camera remain
     }
   }
+}
+
+/// Smallest way (metres plus radians) from `place` to where the camera was before `until_s`.
+double way_to_seen(const Scene& scene, const Se3d& place, double until_s) {
+  double nearest = 1e9;
+  for (double t = 0; t < until_s; t += kFrame_s)
+    nearest = std::min(nearest, norm(scene.camera(t).translation - place.translation) +
+                                    degrees_between(scene.camera(t), place) / 57.3);
+  return nearest;
+}
+
+TEST(Scenes, a_covered_camera_comes_out_elsewhere_at_a_place_it_has_seen) {
+  const struct {
+    const char* name;
+    double from_s, to_s, way;
+  } covers[] = {{"covered", 9.0, 12.0, 0.5},
+                {"camera_kidnapped", 6.0, 6.35, 0.5},
+                {"camera_kidnapped", 10.0, 10.35, 0.5}};
+  for (const auto& c : covers) {
+    const Scene& scene = scene_named(c.name);
+    ASSERT_NE(scene.covered, nullptr);
+    EXPECT_FALSE(scene.covered(c.from_s - 0.01));
+    EXPECT_TRUE(scene.covered(c.from_s + 0.01));
+    EXPECT_TRUE(scene.covered(c.to_s - 0.01));
+    EXPECT_FALSE(scene.covered(c.to_s + 0.01));
+    const Se3d before = scene.camera(c.from_s), after = scene.camera(c.to_s);
+    EXPECT_GT(norm(after.translation - before.translation) + degrees_between(before, after) / 57.3, c.way);
+    EXPECT_LT(way_to_seen(scene, after, c.from_s), 0.3);
+  }
+  EXPECT_EQ(scene_named("static").covered, nullptr);
 }
 
 bool box_moves(const char* name, double t) {

@@ -66,12 +66,40 @@ TEST(SyntheticSource, says_what_it_is) {
   EXPECT_FLOAT_EQ(vga.cy, 239.5f);
 }
 
-TEST(SyntheticSource, lists_the_sixteen_scenes) {
-  EXPECT_EQ(synthetic_scene_names(),
-            (std::vector<std::string>{"static", "balloon", "balloon_tracking", "crowd", "crowd_start",
-                                      "crowd_close", "moving_box", "obstructing_box", "placing_box",
-                                      "removing_box", "placing_obstructing_box", "person_tracking",
-                                      "synchronous", "kidnapping_box", "loop", "fast"}));
+TEST(SyntheticSource, lists_the_eighteen_scenes) {
+  EXPECT_EQ(
+      synthetic_scene_names(),
+      (std::vector<std::string>{"static", "balloon", "balloon_tracking", "crowd", "crowd_start",
+                                "crowd_close", "moving_box", "obstructing_box", "placing_box", "removing_box",
+                                "placing_obstructing_box", "person_tracking", "synchronous", "kidnapping_box",
+                                "loop", "fast", "covered", "camera_kidnapped"}));
+}
+
+TEST(SyntheticSource, a_covered_lens_measures_nothing_and_sees_dark) {
+  const auto source = open_synthetic("covered,size=64x48");
+  ASSERT_TRUE(source) << source.error();
+  std::vector<uint16_t> depth(64 * 48);
+  std::vector<Rgb8> colour(64 * 48);
+  std::vector<uint8_t> mask(64 * 48);
+  RgbdFrame frame;
+  frame.depth_raw = {depth.data(), 48, 64, 64};
+  frame.colour = {colour.data(), 48, 64, 64};
+  frame.truth_mask = {mask.data(), 48, 64, 64};
+  const auto covered = [&](uint32_t first, uint32_t count) {
+    (*source)->skip(first);
+    uint32_t frames = 0;
+    for (uint32_t i = 0; i < count; ++i) {
+      EXPECT_EQ((*source)->next(frame, 0), Status::ok);
+      const bool blind = std::all_of(depth.begin(), depth.end(), [](uint16_t d) { return d == 0; });
+      const bool dark =
+          std::all_of(colour.begin(), colour.end(), [](Rgb8 c) { return c.r < 50 && c.g < 30; });
+      EXPECT_EQ(blind, dark);
+      EXPECT_EQ(blind, std::all_of(mask.begin(), mask.end(), [](uint8_t m) { return m == 255; }));
+      frames += blind ? 1 : 0;
+    }
+    return frames;
+  };
+  EXPECT_EQ(covered(260, 110), 90u);  // seconds 9 to 12
 }
 
 TEST(SyntheticSource, errors_of_the_spec_come_through) {

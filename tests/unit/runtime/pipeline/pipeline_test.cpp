@@ -36,6 +36,16 @@ class ScriptedEngine : public Engine {
     integrate_pose = T;
     return {};
   }
+  void remember_place(const Se3&) override { ++keyframes; }
+  PlaceResult find_place(const Se3& T_guess, int32_t) override {
+    calls += 'f';
+    find_guess = T_guess;
+    return place;
+  }
+  PlaceResult confirm_place(const Se3&) override {
+    calls += 'c';
+    return place;
+  }
   Status raycast(const Se3&, const Intrinsics&, ImageView<float>, ImageView<Rgb8>) override {
     return Status::ok;
   }
@@ -53,7 +63,9 @@ class ScriptedEngine : public Engine {
   std::string calls;  ///< first letters, in order
   Status prepare_status = Status::ok;
   TrackResult tracked, refined;
-  int32_t masked_pixels = 0;
+  int32_t masked_pixels = 0, keyframes = 0;
+  PlaceResult place;
+  Se3 find_guess;
   Se3 track_start, mask_pose, refine_start, integrate_pose;
 };
 
@@ -189,21 +201,83 @@ TEST_F(PipelineTest, LostIsSaidCountedAndComesBack) {
   answer(at(0.1f), 0.9f, Status::degenerate);
   EXPECT_EQ(process(pipeline, 66).state, TrackingState::lost);
   EXPECT_EQ(engine_.calls.find('i'), std::string::npos);
-  answer(at(0.5f), 0.1f);
   const FrameResult lost = process(pipeline, 100);
+  EXPECT_EQ(engine_.calls, "pf");
   EXPECT_EQ(lost.state, TrackingState::lost);
+  EXPECT_NEAR(lost.T_map_cam.translation.x, 0.1, 1e-6);
   EXPECT_EQ(lost.p_good, 0.0f);
   EXPECT_EQ(pipeline.counters().lost_frames, 2u);
   EXPECT_EQ(pipeline.counters().relocalised, 0u);
   engine_.prepare_status = Status::bad_data;
   EXPECT_EQ(process(pipeline, 133).state, TrackingState::lost);  // a bad frame finds nothing again
-  EXPECT_EQ(pipeline.counters().lost_frames, 2u);
+  EXPECT_EQ(pipeline.counters().lost_frames, 3u);
   engine_.prepare_status = Status::ok;
+  engine_.place.status = Status::ok;
+  engine_.place.T_map_cam = at(0.7f);
+  answer(at(0.8f), 0.8f);
+  EXPECT_EQ(process(pipeline, 166).state, TrackingState::lost);  // found, not yet believed
+  EXPECT_EQ(process(pipeline, 200).state, TrackingState::lost);
+  EXPECT_EQ(engine_.calls, "pc");
+  const FrameResult found = process(pipeline, 233);
+  EXPECT_EQ(engine_.calls, "pctmi");
+  EXPECT_EQ(engine_.track_start.translation.x, 0.7f);
+  EXPECT_EQ(found.state, TrackingState::good);
+  EXPECT_NEAR(found.T_map_cam.translation.x, 0.8, 1e-6);
+  EXPECT_EQ(pipeline.counters().relocalised, 1u);
+  EXPECT_EQ(pipeline.counters().lost_frames, 5u);
+  process(pipeline, 266);
+  EXPECT_EQ(engine_.calls, "ptmi");
+  EXPECT_EQ(pipeline.counters().relocalised, 1u);
+}
+
+TEST_F(PipelineTest, WithoutRelocalisationALostCameraIsTrackedOn) {
+  config_.relocalise.enabled = false;
+  Pipeline pipeline(engine_, config_);
+  process(pipeline, 0);
+  answer(at(0.5f), 0.1f);
+  EXPECT_EQ(process(pipeline, 33).state, TrackingState::lost);
   answer(at(0.2f), 0.8f);
-  EXPECT_EQ(process(pipeline, 166).state, TrackingState::good);
+  EXPECT_EQ(process(pipeline, 66).state, TrackingState::good);
+  EXPECT_EQ(engine_.calls, "ptmi");
   EXPECT_EQ(pipeline.counters().relocalised, 1u);
-  process(pipeline, 200);
-  EXPECT_EQ(pipeline.counters().relocalised, 1u);
+  EXPECT_EQ(engine_.keyframes, 0);
+}
+
+TEST_F(PipelineTest, ALongStretchWithoutAUsableFrameIsALoss) {
+  Pipeline pipeline(engine_, config_);
+  process(pipeline, 0);
+  answer(at(0.1f));
+  process(pipeline, 33);
+  process(pipeline, 66);
+  engine_.prepare_status = Status::bad_data;
+  EXPECT_EQ(process(pipeline, 200).state, TrackingState::good);  // relocalise.blind_s is 0.2
+  EXPECT_EQ(process(pipeline, 300).state, TrackingState::lost);
+  engine_.prepare_status = Status::ok;
+  EXPECT_EQ(process(pipeline, 333).state, TrackingState::lost);
+  EXPECT_EQ(engine_.calls, "pf");
+  EXPECT_EQ(engine_.find_guess.translation.x, 0.1f);  // the last pose is tried
+  EXPECT_EQ(pipeline.counters().lost_frames, 2u);
+  EXPECT_EQ(pipeline.counters().bad_frames, 2u);
+}
+
+TEST_F(PipelineTest, MissingFramesAreALossButASlowSourceIsNot) {
+  Pipeline pipeline(engine_, config_);
+  answer(at(0.1f));
+  for (const int64_t stamp_ms : {0, 500, 1000, 1500})
+    EXPECT_EQ(process(pipeline, stamp_ms).state, TrackingState::good) << stamp_ms;
+  EXPECT_EQ(process(pipeline, 3100).state, TrackingState::lost);
+}
+
+TEST_F(PipelineTest, WellTrackedFramesAreOfferedAsKeyframes) {
+  Pipeline pipeline(engine_, config_);
+  process(pipeline, 0);
+  EXPECT_EQ(engine_.keyframes, 1);
+  answer(at(0.1f), 0.3f);  // poor
+  for (int i = 1; i < 10; ++i) process(pipeline, 33 * i);
+  EXPECT_EQ(engine_.keyframes, 1);
+  answer(at(0.1f));
+  for (int i = 10; i < 16; ++i) process(pipeline, 33 * i);
+  EXPECT_EQ(engine_.keyframes, 3);  // every third
 }
 
 TEST_F(PipelineTest, ADegenerateFrameKeepsThePose) {
@@ -228,6 +302,7 @@ TEST_F(PipelineTest, StartsFromTheLastPoseUnlessAskedOtherwise) {
 }
 
 TEST_F(PipelineTest, ConstantVelocityContinuesTheLastMotionByTime) {
+  config_.relocalise.blind_s = 10;
   config_.track.prior = MotionPrior::constant_velocity;
   config_.track.prior_fade_s = 10;
   Pipeline pipeline(engine_, config_);
@@ -261,6 +336,7 @@ TEST_F(PipelineTest, ConstantVelocityTurnsWithTheCamera) {
 }
 
 TEST_F(PipelineTest, NoMotionIsContinuedOverALossOrAStampThatJumpsBack) {
+  config_.relocalise.enabled = false;
   config_.track.prior = MotionPrior::constant_velocity;
   Pipeline pipeline(engine_, config_);
   process(pipeline, 1000);
