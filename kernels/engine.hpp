@@ -49,6 +49,14 @@ struct PrepareResult {
   int32_t valid_pixels = 0;
 };
 
+/// Where the pose is expected before the frame is looked at, and how sure that is.
+struct PosePrior {
+  Se3 T_world_cam;
+  /// Inverse covariance of the twist (v, w) in the map's axes about the camera's centre, upper triangle row
+  /// by row, x y z rx ry rz, 1/m^2 and 1/rad^2. All 0: nothing is expected.
+  float information[21] = {};
+};
+
 struct TrackResult {
   Status status = Status::ok;  ///< degenerate: T_world_cam is the start pose
   Se3 T_world_cam;
@@ -131,11 +139,11 @@ class Engine {
   /// Metres, range gate, undistortion, intensity. The views need to live until the call returns.
   virtual PrepareResult prepare(const FrameView& frame) = 0;
   /// First registration (paper III-B), all pixels.
-  virtual TrackResult track(const Se3& T_world_cam_start) = 0;
+  virtual TrackResult track(const Se3& T_world_cam_start, const PosePrior& prior = {}) = 0;
   /// Dynamic pixels from the residuals at this pose (paper III-C). Replaces the mask of the last frame.
   virtual MaskResult mask(const Se3& T_world_cam) = 0;
   /// Second registration, masked pixels excluded (paper III-C).
-  virtual TrackResult refine(const Se3& T_world_cam_start) = 0;
+  virtual TrackResult refine(const Se3& T_world_cam_start, const PosePrior& prior = {}) = 0;
   /// Allocates on unmasked rays, fuses, carves (paper III-A, III-D).
   virtual IntegrateResult integrate(const Se3& T_world_cam) = 0;
 

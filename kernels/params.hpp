@@ -63,6 +63,7 @@ struct TrackParams {
   float converged_m = 1e-4f;
   float converged_rad = 1e-4f;
   MotionPrior prior = MotionPrior::constant_velocity;
+  float prior_point_m = 0.02f;
   float prior_gain = 0.5f;
   float prior_fade_s = 0.3f;
   float prior_forget = 0.1f;
@@ -109,6 +110,10 @@ struct TrackParams {
     f("converged_rad", &P::converged_rad, 0, 0.1, "rad", "ours", "see converged_m");
     f("prior", &P::prior, 0, 2, "last_pose|constant_velocity|odometry", "ours",
       "where the registration starts; odometry: constant velocity while it is stale");
+    f("prior_point_m", &P::prior_point_m, 0, 1.0, "m", "ours",
+      "the prior is worth so many points as this error of one goes into its variance; 0: it is only where "
+      "the "
+      "registration starts");
     f("prior_gain", &P::prior_gain, 0.01, 1.0, "1", "ours",
       "share of the newest motion in the velocity that is continued");
     f("prior_fade_s", &P::prior_fade_s, 0.01, 10.0, "s", "ours",
@@ -149,6 +154,7 @@ struct MaskParams {
   float blob_m2 = 0.004f;
   float grow_m = 0.03f;
   bool warp = true;
+  int32_t reabsorb_frames = 60;
 
   template <class F>
   static void fields(F&& f) {
@@ -185,6 +191,8 @@ struct MaskParams {
       "a connected area of contradicting points this large is dynamic by itself");
     f("grow_m", &P::grow_m, 0, 0.5, "m", "ours", "how far the mask grows beyond what was found");
     f("warp", &P::warp, 0, 1, "bool", "ours", "the last mask, carried into this frame, is the first guess");
+    f("reabsorb_frames", &P::reabsorb_frames, 1, 255, "frames", "ours",
+      "what contradicts the map but stood still for so long is static; 255: never");
   }
 };
 
@@ -193,6 +201,8 @@ struct IntegrateParams {
   int32_t weight_cap = 64;
   float free_max_m = 5.0f;
   bool free_space = true;
+  bool through_movers = true;
+  bool relearn = true;
 
   template <class F>
   static void fields(F&& f) {
@@ -200,6 +210,10 @@ struct IntegrateParams {
     f("weight_cap", &P::weight_cap, 1, 255, "observations", "ours", "the running mean forgets older ones");
     f("free_max_m", &P::free_max_m, 0.1, 20.0, "m", "III-D", "clipping plane of free space");
     f("free_space", &P::free_space, 0, 1, "bool", "III-D", "false: only the truncation band is mapped");
+    f("through_movers", &P::through_movers, 0, 1, "bool", "ours",
+      "what lies before a dynamic point is seen free, too; false: masked pixels change nothing (III-D)");
+    f("relearn", &P::relearn, 0, 1, "bool", "ours",
+      "a static surface in space that was free halves the weight of what was there");
   }
 };
 

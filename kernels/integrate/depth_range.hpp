@@ -47,7 +47,8 @@ static_assert(kTilePx == 1 << 3);
 struct StaticDepthPass {
   ImageView<const float> depth_m;
   ImageView<const uint8_t> mask;    ///< no data: nothing is masked
-  ImageView<float> static_depth_m;  ///< 0: no static measurement
+  bool through_movers = false;      ///< true: masked pixels still say what is free before them
+  ImageView<float> static_depth_m;  ///< 0: no static measurement; below 0: minus the depth of a mover
   ImageView<DepthRange> tiles;
 
   STILLMAP_HD void operator()(int32_t tile_row, int32_t tile_col) const {
@@ -57,8 +58,8 @@ struct StaticDepthPass {
     for (int32_t r = tile_row * kTilePx; r < row_end; ++r)
       for (int32_t c = tile_col * kTilePx; c < col_end; ++c) {
         const bool masked = mask.data && mask.at(r, c);
-        const float z_m = masked ? 0.0f : depth_m.at(r, c);
-        static_depth_m.at(r, c) = z_m;
+        const float z_m = masked && !through_movers ? 0.0f : depth_m.at(r, c);
+        static_depth_m.at(r, c) = masked ? -z_m : z_m;
         range = merged(range, {z_m, z_m});
       }
     tiles.at(tile_row, tile_col) = range;

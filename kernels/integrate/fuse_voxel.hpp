@@ -22,13 +22,15 @@ struct Observation {
 
 /// The frame, as integration needs it.
 struct FrameGeometry {
-  ImageView<const float> static_depth_m;  ///< masked pixels are 0
+  ImageView<const float> static_depth_m;  ///< 0: nothing known; below 0: minus the depth of a mover
   Intrinsics k;
   float min_m = 0;       ///< nearer than this the camera sees nothing
   float max_m = 0;       ///< measurements beyond make free space only
   float free_max_m = 0;  ///< clipping plane of free space
   float truncation_m = 0;
 };
+
+constexpr float kMoverGap = 0.4f;  ///< of tau: this far before a mover space is free
 
 /// Projective signed distance along the optical axis: measured depth minus depth of the voxel.
 ///                                                                       test: integrate_test
@@ -46,11 +48,13 @@ STILLMAP_HD Observation<F> observe(const FrameGeometry& g, Vec3T<F> p_cam) {
   const IntOf<F> col = to_int(select(inside, u, zero)), row = to_int(select(inside, v, zero));
   Observation<F> o;
   o.pixel = row * IntOf<F>(image.pitch) + col;
-  const F z_m = gather_float(image.data, o.pixel);
+  const F seen_m = gather_float(image.data, o.pixel), z_m = abs_of(seen_m);
   o.sdf_m = z_m - p_cam.z;
-  const MaskOf<F> measured = inside & (z_m > zero), beyond = o.sdf_m >= F(g.truncation_m);
-  o.free = measured & beyond & (p_cam.z <= F(g.free_max_m));
-  o.band = measured & !beyond & (o.sdf_m > F(-g.truncation_m)) & (z_m <= F(g.max_m));
+  const MaskOf<F> still = inside & (seen_m > zero), mover = inside & (seen_m < zero);
+  // A mover is not fused, so that nothing is in the way of what is free right before it.
+  const MaskOf<F> beyond = o.sdf_m >= F(g.truncation_m), before = o.sdf_m >= F(kMoverGap * g.truncation_m);
+  o.free = ((still & beyond) | (mover & before)) & (p_cam.z <= F(g.free_max_m));
+  o.band = still & !beyond & (o.sdf_m > F(-g.truncation_m)) & (z_m <= F(g.max_m));
   return o;
 }
 
@@ -86,6 +90,7 @@ struct VoxelState {
 struct FuseWeights {
   float units_per_m = 0;  ///< of VoxelSurface::sdf
   float weight_cap = 64;
+  bool relearn = false;  ///< a surface well inside what was free halves the weight
 };
 
 /// Weighted running means of distance and colour of a voxel (paper III-A), and carving (III-D): in free space
@@ -101,6 +106,9 @@ STILLMAP_HD VoxelState<F> fused(VoxelState<F> v, const Observation<F>& o, F luma
   const MaskOf<F> any = o.free | o.band;
   const F old = select(v.weight > F(0.0f), v.sdf, F(0.0f));
   const F observed = select(o.band, o.sdf_m * F(p.units_per_m), tau);
+  if (p.relearn)
+    v.weight =
+        select(o.band & (old - observed > F(0.5f) * tau), to_float(to_int(F(0.5f) * v.weight)), v.weight);
   const F mean = round_nearest(old + (observed - old) / (v.weight + one));
   const F sdf = select(o.band, mean, min_of(max_of(mean, old + one), tau));
   const F share = one / (v.colour_weight + one);

@@ -48,6 +48,8 @@ struct CellGrid {
   ImageView<Vec3> normal;    ///< camera frame, towards the camera; 0: none
   ImageView<Contradiction> evidence;
   ImageView<CellResidual> residual;
+  ImageView<float> crept_m;     ///< how far it has gone along its normal in that time
+  ImageView<uint8_t> still;     ///< frames that the surface in a cell has been where it is, at most 255
   ImageView<uint8_t> expected;  ///< 255: dynamic by the last frame's mask, carried into this one
   ImageView<uint8_t> dynamic;   ///< 255: dynamic
   ImageView<int32_t> part;      ///< number of the connected part a cell belongs to; < 0: none
@@ -162,6 +164,48 @@ struct CellEvidencePass {
     }
     cells.residual.at(row, col) = residual;
     cells.evidence.at(row, col) = contradiction;
+  }
+};
+
+/// What a cell showed in the last frame.
+struct CellsBefore {
+  ImageView<float> depth_m, luma, crept_m;
+  ImageView<uint8_t> dynamic, still;
+};
+
+/// Counts for how many frames the surface of a cell has been in its place: the last frame, looked at from
+/// this one, must show the same surface and brightness there, and it may not creep away either.
+struct StillPass {
+  CellGrid cells;
+  CellsBefore before;
+  Se3 T_before_now;
+  DepthNoise noise;
+
+  STILLMAP_HD void operator()(int32_t row, int32_t col) const {
+    const float z_m = cells.depth_m.at(row, col);
+    int32_t frames = 0;
+    float crept_m = 0;
+    if (z_m > 0.0f) {
+      const Vec3 p = T_before_now * cells.point(row, col);
+      const Pixel at = project(cells.k, p);
+      const int32_t r = static_cast<int32_t>(floorf(at.v + 0.5f)),
+                    c = static_cast<int32_t>(floorf(at.u + 0.5f));
+      if (p.z > 0.0f && before.depth_m.contains(r, c) && before.depth_m.at(r, c) > 0.0f) {
+        const Vec3 was =
+            unproject(cells.k, static_cast<float>(c), static_cast<float>(r), before.depth_m.at(r, c));
+        // Along the normal: the cell need not be met in its middle.
+        const float off_m = dot(T_before_now.rotation * cells.normal.at(row, col), p - was);
+        const float near_m = 0.01f + 2.0f * noise.at(z_m);
+        const bool same = fabsf(before.luma.at(r, c) - cells.luma.at(row, col)) < 0.1f * kLumaScale;
+        crept_m = before.crept_m.at(r, c) + off_m;
+        if (fabsf(was.z - p.z) > depth_edge_m(z_m) + near_m || fabsf(crept_m) > near_m)
+          crept_m = 0;
+        else  // noise alone changes the brightness now and then
+          frames = before.still.at(r, c) + (same ? 1 : -8);
+      }
+    }
+    cells.crept_m.at(row, col) = crept_m;
+    cells.still.at(row, col) = static_cast<uint8_t>(frames < 0 ? 0 : frames < 255 ? frames : 255);
   }
 };
 

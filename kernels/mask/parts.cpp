@@ -83,21 +83,21 @@ void settle_borders(const CellGrid& cells, const PartMemory& memory) {
       }
 }
 
-/// Connected areas of contradicting cells whose core (cells with nothing else beside them) is large enough:
-/// what is only a rim along an edge of the map does not count.
-void mark_blobs(const CellGrid& cells, const PartMemory& memory, float min_core_m2) {
+/// Sets `value` in connected areas of cells that are `wanted` and whose core (cells with nothing else beside
+/// them) is large enough: what is only a rim along an edge of the map does not count.
+template <class Wanted>
+void set_blobs(const CellGrid& cells, const PartMemory& memory, float min_core_m2, uint8_t value,
+               const Wanted& wanted) {
   const int32_t rows = cells.part.rows, cols = cells.part.cols;
   const ImageView<uint8_t> seen = memory.scratch;
   std::fill_n(seen.data, seen.pixels(), uint8_t{0});
-  const auto contradicts = [&](int32_t r, int32_t c) { return cells.evidence.at(r, c) >= 1.0f; };
   const auto core = [&](int32_t r, int32_t c) {
     bool inner = true;
-    for_neighbours(r, c, cells.depth_m,
-                   [&](int32_t nr, int32_t nc) { inner = inner && contradicts(nr, nc); });
+    for_neighbours(r, c, cells.depth_m, [&](int32_t nr, int32_t nc) { inner = inner && wanted(nr, nc); });
     return inner;
   };
   for (int32_t start = 0; start < rows * cols; ++start) {
-    if (seen.data[start] || cells.evidence.data[start] < 1.0f) continue;
+    if (seen.data[start] || !wanted(start / cols, start % cols)) continue;
     uint32_t tail = 0;
     float core_m2 = 0;
     memory.queue[tail++] = start;
@@ -107,14 +107,13 @@ void mark_blobs(const CellGrid& cells, const PartMemory& memory, float min_core_
       if (core(r, c)) core_m2 += cell_area_m2(cells, r, c);
       for_neighbours(r, c, cells.depth_m, [&](int32_t nr, int32_t nc) {
         const float jump_m = std::fabs(cells.depth_m.at(nr, nc) - cells.depth_m.at(r, c));
-        if (seen.at(nr, nc) || !contradicts(nr, nc) || jump_m > 2 * depth_edge_m(cells.depth_m.at(r, c)))
-          return;
+        if (seen.at(nr, nc) || !wanted(nr, nc) || jump_m > 2 * depth_edge_m(cells.depth_m.at(r, c))) return;
         seen.at(nr, nc) = kSet;
         memory.queue[tail++] = nr * cols + nc;
       });
     }
     if (core_m2 < min_core_m2) continue;
-    for (uint32_t i = 0; i < tail; ++i) cells.dynamic.data[memory.queue[i]] = kSet;
+    for (uint32_t i = 0; i < tail; ++i) cells.dynamic.data[memory.queue[i]] = value;
   }
 }
 
@@ -154,7 +153,7 @@ int32_t segment(const CellGrid& cells, const PartMemory& memory, const MaskParam
   return parts;
 }
 
-void gather_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory) {
+void gather_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory, const MaskParams& params) {
   const DepthNoise noise;
   for (int32_t i = 0; i < parts; ++i) memory.parts[static_cast<uint32_t>(i)] = {};
   for (int32_t r = 0; r < cells.part.rows; ++r)
@@ -163,6 +162,7 @@ void gather_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory
       Part& part = memory.parts[static_cast<uint32_t>(cells.part.at(r, c))];
       const Contradiction contradiction = cells.evidence.at(r, c);
       ++part.cells;
+      part.still += cells.still.at(r, c) >= params.reabsorb_frames;
       part.expected += cells.expected.at(r, c) != 0;
       const float area_m2 = cell_area_m2(cells, r, c);
       part.area_m2 += area_m2;
@@ -248,6 +248,22 @@ float usual_offset(int32_t parts, const PartMemory& memory, const MaskParams& pa
   return 0.0f;
 }
 
+bool has_moved(const Part& part, const MaskParams& params, float usual) {
+  return params.moved_m > 0.0f && part.area_m2 >= params.moved_m2 &&
+         static_cast<double>(part.moved_m) > may_move_m(part, params) * static_cast<double>(usual);
+}
+
+/// Share of the area that follows another motion than most of it: with half or more nothing was agreed on.
+float moved_share(int32_t parts, const PartMemory& memory, const MaskParams& params, float usual) {
+  float moved = 0, all = 0;
+  for (int32_t i = 0; i < parts; ++i) {
+    const Part& part = memory.parts[static_cast<uint32_t>(i)];
+    all += part.area_m2;
+    if (has_moved(part, params, usual)) moved += part.area_m2;
+  }
+  return all > 0.0f ? moved / all : 0.0f;
+}
+
 }  // namespace
 
 Twistd agree_on_motion(int32_t parts, const PartMemory& memory, const MaskParams& params, float& usual) {
@@ -287,24 +303,32 @@ Twistd agree_on_motion(int32_t parts, const PartMemory& memory, const MaskParams
 void decide_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory, const MaskParams& params,
                   float usual) {
   std::fill_n(cells.dynamic.data, cells.dynamic.pixels(), uint8_t{0});
+  const bool believe_moves = moved_share(parts, memory, params, usual) < 0.5f;
   for (int32_t i = 0; i < parts; ++i) {
     Part& part = memory.parts[static_cast<uint32_t>(i)];
     const bool was = params.warp && 2 * part.expected > part.cells;
     const float share = part.known > 0 ? part.contradicts / part.known : 0.0f;
     const bool hardly_known = part.known < 0.2f * static_cast<float>(part.cells);
-    const double may = may_move_m(part, params) * static_cast<double>(usual) * (was ? 0.7 : 1.0);
-    const bool moved =
-        params.moved_m > 0.0f && part.area_m2 >= params.moved_m2 && static_cast<double>(part.moved_m) > may;
-    part.dynamic =
-        moved ||
-        (part.contradicts_m2 >= params.blob_m2 && share > (was ? params.share_off : params.share_on)) ||
-        (was && hardly_known);
+    part.moved = believe_moves && has_moved(part, params, usual * (was ? 0.7f : 1.0f));
+    const bool contradicts =
+        part.contradicts_m2 >= params.blob_m2 && share > (was ? params.share_off : params.share_on);
+    const bool settled = params.reabsorb_frames < 255 && 5 * part.still > 4 * part.cells;
+    part.dynamic = !settled && (part.moved || contradicts || (was && hardly_known));
   }
   for (int32_t i = 0; i < cells.part.pixels(); ++i) {
     const int32_t number = cells.part.data[i];
     if (number >= 0 && memory.parts[static_cast<uint32_t>(number)].dynamic) cells.dynamic.data[i] = kSet;
   }
-  mark_blobs(cells, memory, params.blob_m2);
+  // A thing that was put down on another makes one part with it: what the map knows well stays static.
+  set_blobs(cells, memory, params.moved_m2, 0, [&](int32_t r, int32_t c) {
+    const int32_t number = cells.part.at(r, c);
+    if (number < 0 || !cells.dynamic.at(r, c) || memory.parts[static_cast<uint32_t>(number)].moved)
+      return false;
+    return cells.evidence.at(r, c) >= 0.0f && cells.evidence.at(r, c) < 0.5f;
+  });
+  set_blobs(cells, memory, params.blob_m2, kSet, [&](int32_t r, int32_t c) {
+    return cells.evidence.at(r, c) >= 1.0f && cells.still.at(r, c) < params.reabsorb_frames;
+  });
   grow(cells, memory, params.grow_m);
 }
 

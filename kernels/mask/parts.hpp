@@ -10,12 +10,13 @@ namespace stillmap {
 
 /// What is known of one connected part of the picture.
 struct Part {
-  int32_t cells = 0, expected = 0;
+  int32_t cells = 0, expected = 0, still = 0;
   float known = 0, contradicts = 0;       ///< cells with a value in the map; sum of their contradiction
   float area_m2 = 0, contradicts_m2 = 0;  ///< as seen; of what contradicts
   float noise_m = 0;                      ///< mean of the cells' noise
   NormalEq motion;                        ///< its own least squares by the motion of the camera
-  float moved_m = 0;  ///< how far its surface lies off where the whole picture would have it
+  float moved_m = 0;   ///< how far its surface lies off where the whole picture would have it
+  bool moved = false;  ///< farther than it may
   bool dynamic = false;
 };
 
@@ -34,7 +35,7 @@ int32_t segment(const CellGrid& cells, const PartMemory& memory, const MaskParam
                 const DepthNoise& noise);
 
 /// Adds up evidence and least squares of each part.                    test: parts_test
-void gather_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory);
+void gather_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory, const MaskParams& params);
 
 /// The motion that most of the *space* agrees on: movers may fill the picture, but not the room. Parts that
 /// follow another motion lose their vote; fills Part::moved_m.           test: parts_test

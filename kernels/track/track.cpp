@@ -5,6 +5,35 @@
 namespace stillmap {
 namespace {
 
+/// The prior as a residual of the pose: information in units of a pass over every `step`-th pixel.
+struct Expected {
+  Se3d T_map_cam;
+  double information[21];
+
+  Expected(const PosePrior& prior, double scale) : T_map_cam(cast<double>(prior.T_world_cam)) {
+    for (int i = 0; i < 21; ++i) information[i] = scale * static_cast<double>(prior.information[i]);
+  }
+  /// Adds its gradient and Hessian at a pose. @return its cost
+  double add_to(const Se3& T_now, NormalEq& sums) const {
+    const Se3d T = cast<double>(T_now);
+    const Vec3d v = T.translation - T_map_cam.translation;
+    const Vec3d w = log_rotation(T.rotation * transposed(T_map_cam.rotation));
+    const double x[6] = {v.x, v.y, v.z, w.x, w.y, w.z};
+    double slope[6] = {}, cost = 0;
+    for (int r = 0, k = 0; r < 6; ++r)
+      for (int c = r; c < 6; ++c, ++k) {
+        sums.sum[kHessian + k] += information[k];
+        slope[r] += information[k] * x[c];
+        if (c != r) slope[c] += information[k] * x[r];
+      }
+    for (int i = 0; i < 6; ++i) {
+      sums.sum[kGradient + i] += slope[i];
+      cost += x[i] * slope[i];
+    }
+    return cost;
+  }
+};
+
 struct Step {
   Se3 T_map_cam;
   double translation_m = 0, rotation_rad = 0;
@@ -42,16 +71,25 @@ struct State {
   bool converged;  ///< the last step was small
 };
 
+/// A pass with the prior added.
+NormalEq summed(const PassRunner& pass, const Se3& T_map_cam, int32_t step_px, const Expected& expected) {
+  NormalEq sums = pass(T_map_cam, step_px);
+  sums.sum[kCost] += expected.add_to(T_map_cam, sums);
+  return sums;
+}
+
 /// One level: at most `iterations` steps, accepted or rejected.
 int32_t run_level(const PassRunner& pass, int32_t step_px, int32_t iterations, const TrackParams& p,
-                  State& state) {
-  state.sums = pass(state.T_map_cam, step_px);
+                  const PosePrior& prior, State& state) {
+  const double point_m = static_cast<double>(p.prior_point_m);
+  const Expected expected(prior, point_m * point_m / (step_px * step_px));
+  state.sums = summed(pass, state.T_map_cam, step_px, expected);
   int32_t i = 0;
   while (i < iterations) {
     Step step;
     if (!solve_step(state.sums, state.damping, state.T_map_cam, step)) return i;
     ++i;
-    const NormalEq candidate = pass(step.T_map_cam, step_px);
+    const NormalEq candidate = summed(pass, step.T_map_cam, step_px, expected);
     const bool accepted = better(candidate, state.sums);
     state.damping *= static_cast<double>(accepted ? p.damping_down : p.damping_up);
     if (accepted) {
@@ -95,13 +133,13 @@ void write_covariance(const NormalEq& sums, Vec3 centre, float covariance[21]) {
 }  // namespace
 
 TrackResult register_frame(const PassRunner& pass, const Se3& T_start, const TrackParams& params,
-                           LevelRange levels, int32_t min_points) {
+                           LevelRange levels, int32_t min_points, const PosePrior& prior) {
   const int32_t iterations[3] = {params.iterations_fine, params.iterations_middle, params.iterations_coarse};
   TrackResult result;
   result.T_world_cam = T_start;
   State state{T_start, {}, static_cast<double>(params.damping_initial), false};
   for (int32_t level = levels.coarsest; level >= levels.finest; --level)
-    result.iterations += run_level(pass, 1 << level, iterations[level], params, state);
+    result.iterations += run_level(pass, 1 << level, iterations[level], params, prior, state);
 
   const NormalEq& sums = state.sums;
   result.mapped_ratio =

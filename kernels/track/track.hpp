@@ -9,14 +9,6 @@
 
 namespace stillmap {
 
-/// Where the pose is expected before the frame was looked at, and how much that is worth.
-struct PosePrior {
-  Se3 T_map_cam;
-  /// Equivalent of so many points of weight 1 along each axis: x y z of the camera centre, rx ry rz about it,
-  /// map axes. All 0: no prior.
-  float information[6] = {};
-};
-
 /// Which levels a registration goes through.
 struct LevelRange {
   int32_t coarsest = 2, finest = 0;
@@ -32,11 +24,12 @@ struct PassRunner {
 };
 
 /// Minimises E_d + w_c E_c from `T_start`.                              test: track_test
+/// @param prior enters as one more residual, weighed as track.prior_point_m says
 /// @param min_points with fewer points that have a value in the map the answer is `degenerate`, at the finest
 /// level
 /// @return status ok, or degenerate with T_world_cam = T_start
 /// @thread the engine's caller
 TrackResult register_frame(const PassRunner& pass, const Se3& T_start, const TrackParams& params,
-                           LevelRange levels, int32_t min_points);
+                           LevelRange levels, int32_t min_points, const PosePrior& prior = {});
 
 }  // namespace stillmap

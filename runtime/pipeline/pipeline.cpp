@@ -32,6 +32,17 @@ float probability_good(float inlier_ratio, const TrackParams& p) {
                     1.0f);
 }
 
+/// What the engine is told about the pose to come.
+PosePrior prior_from(const PredictedPose& expected, const TrackParams& p) {
+  PosePrior prior;
+  prior.T_world_cam = cast<float>(expected.T_map_cam);
+  if (p.prior == MotionPrior::last_pose || p.prior_point_m <= 0) return prior;
+  double information[21];
+  information_in_map_axes(expected, information);
+  for (int i = 0; i < 21; ++i) prior.information[i] = static_cast<float>(information[i]);
+  return prior;
+}
+
 TrackingState state_of(const TrackResult& track, const TrackParams& p) {
   if (track.status != Status::ok || track.inlier_ratio < p.lost_inlier_ratio) return TrackingState::lost;
   return track.inlier_ratio < p.poor_inlier_ratio ? TrackingState::poor : TrackingState::good;
@@ -97,7 +108,9 @@ FrameResult Pipeline::start_map(FrameResult result) {
 /// Paper Fig. 2: initial pose, dynamics from its residuals, refined pose, integration.
 FrameResult Pipeline::track_and_map(FrameResult result) {
   StopWatch watch;
-  const TrackResult initial = engine_.track(cast<float>(predictor_.predict(result.stamp).T_map_cam));
+  const PredictedPose expected = predictor_.predict(result.stamp);
+  const PosePrior prior = prior_from(expected, config_.track);
+  const TrackResult initial = engine_.track(prior.T_world_cam, prior);
   result.ms.track_ms = watch.lap_ms();
   const MaskResult mask = engine_.mask(initial.T_world_cam);
   result.ms.mask_ms = watch.lap_ms();
@@ -105,7 +118,7 @@ FrameResult Pipeline::track_and_map(FrameResult result) {
   // converged.
   const bool go_on =
       mask.masked_valid_pixels > 0 || !initial.converged || config_.track.first_finest_level > 0;
-  const TrackResult refined = go_on ? engine_.refine(initial.T_world_cam) : initial;
+  const TrackResult refined = go_on ? engine_.refine(initial.T_world_cam, prior) : initial;
   result.ms.refine_ms = watch.lap_ms();
 
   const int32_t pixels = engine_.mask_image().pixels();

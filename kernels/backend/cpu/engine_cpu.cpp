@@ -67,8 +67,7 @@ struct CpuMemory {
   View<int32_t> flood_queue;
   ImageView<uint8_t> trust;
   CellGrid cells;
-  ImageView<float> depth_before_m;  ///< of the cells of the last frame
-  ImageView<uint8_t> dynamic_before;
+  CellsBefore before;
   PartMemory part_memory;
   DepthRangePyramid ranges;
   View<NormalEqT<float>> track_tiles;
@@ -117,8 +116,13 @@ struct CpuMemory {
     cells.expected = arena.take_image<uint8_t>("parts", rows, cols);
     cells.dynamic = arena.take_image<uint8_t>("parts", rows, cols);
     cells.part = arena.take_image<int32_t>("parts", rows, cols);
-    depth_before_m = arena.take_image<float>("parts", rows, cols);
-    dynamic_before = arena.take_image<uint8_t>("parts", rows, cols);
+    cells.still = arena.take_image<uint8_t>("parts", rows, cols);
+    cells.crept_m = arena.take_image<float>("parts", rows, cols);
+    before.depth_m = arena.take_image<float>("parts", rows, cols);
+    before.luma = arena.take_image<float>("parts", rows, cols);
+    before.crept_m = arena.take_image<float>("parts", rows, cols);
+    before.dynamic = arena.take_image<uint8_t>("parts", rows, cols);
+    before.still = arena.take_image<uint8_t>("parts", rows, cols);
     const uint64_t count = static_cast<uint64_t>(rows) * static_cast<uint64_t>(cols);
     part_memory.parts = arena.take<Part>("parts", count);
     part_memory.queue = arena.take<int32_t>("parts", count);
@@ -151,10 +155,10 @@ class CpuEngine final : public Engine {
   bool failed() const { return arena_.failed(); }
 
   PrepareResult prepare(const FrameView& frame) override;
-  TrackResult track(const Se3& T_world_cam_start) override;
+  TrackResult track(const Se3& T_world_cam_start, const PosePrior& prior) override;
   MaskResult mask(const Se3& T_world_cam) override;
-  TrackResult refine(const Se3& T_world_cam_start) override {
-    return register_to_map(T_world_cam_start, memory_.trust, {params_.track.levels - 1, 0});
+  TrackResult refine(const Se3& T_world_cam_start, const PosePrior& prior) override {
+    return register_to_map(T_world_cam_start, memory_.trust, {params_.track.levels - 1, 0}, prior);
   }
   IntegrateResult integrate(const Se3& T_world_cam) override;
   void remember_place(const Se3& T_map_cam) override {
@@ -189,9 +193,11 @@ class CpuEngine final : public Engine {
   PreparedView prepared_view() const { return {memory_.depth_m, memory_.luma_chroma, memory_.mask}; }
   void fill_source_pixels();
   TrackPass track_pass(const Se3& T_map_cam) const;
-  TrackResult register_to_map(const Se3& T_start, ImageView<const uint8_t> trust, LevelRange levels);
+  TrackResult register_to_map(const Se3& T_start, ImageView<const uint8_t> trust, LevelRange levels,
+                              const PosePrior& prior);
   bool by_parts() const { return params_.mask.enabled && params_.mask.method == MaskMethod::parts; }
   void make_cells();
+  void remember_cells();
   void mask_by_residual(const Se3& T_map_cam);
   void mask_by_parts(const Se3& T_map_cam);
   void write_static_pixels(bool masked);
@@ -283,14 +289,14 @@ void set_kernel(const EngineParams& params, int32_t step, TrackWeights& weights)
   weights.kernel_per_range2 = p.kernel_sigmas * params.depth.noise_per_m2;
 }
 
-TrackResult CpuEngine::track(const Se3& T_start) {
+TrackResult CpuEngine::track(const Se3& T_start, const PosePrior& prior) {
   const LevelRange levels = {params_.track.levels - 1,
                              std::min(params_.track.first_finest_level, params_.track.levels - 1)};
-  if (!by_parts()) return register_to_map(T_start, {}, levels);
+  if (!by_parts()) return register_to_map(T_start, {}, levels, prior);
   if (params_.mask.warp)
-    carry_mask(memory_.depth_before_m, memory_.dynamic_before, inverse(T_start) * T_before_, memory_.cells);
+    carry_mask(memory_.before.depth_m, memory_.before.dynamic, inverse(T_start) * T_before_, memory_.cells);
   write_static_pixels(false);
-  return register_to_map(T_start, memory_.trust, levels);
+  return register_to_map(T_start, memory_.trust, levels, prior);
 }
 
 void CpuEngine::make_cells() {
@@ -326,18 +332,30 @@ void CpuEngine::mask_by_parts(const Se3& T_map_cam) {
                                   params_.mask.contradict_sigmas};
   in_row_tiles(cells.depth_m.rows,
                [&](int32_t first, int32_t last) { loops_.cell_evidence(evidence, first, last); });
+  const StillPass still{cells, memory_.before, inverse(T_before_) * T_map_cam, noise};
+  in_row_tiles(cells.depth_m.rows,
+               [&](int32_t first, int32_t last) { loops_.still_cells(still, first, last); });
   const int32_t parts = segment(cells, memory_.part_memory, params_.mask, noise);
-  gather_parts(cells, parts, memory_.part_memory);
+  gather_parts(cells, parts, memory_.part_memory, params_.mask);
   agree_on_motion(parts, memory_.part_memory, params_.mask, usual_);
   decide_parts(cells, parts, memory_.part_memory, params_.mask, usual_);
   write_static_pixels(true);
-  std::copy_n(cells.depth_m.data, cells.depth_m.pixels(), memory_.depth_before_m.data);
-  std::copy_n(cells.dynamic.data, cells.dynamic.pixels(), memory_.dynamic_before.data);
+  remember_cells();
   T_before_ = T_map_cam;
 }
 
-TrackResult CpuEngine::register_to_map(const Se3& T_start, ImageView<const uint8_t> trust,
-                                       LevelRange levels) {
+void CpuEngine::remember_cells() {
+  const CellGrid& now = memory_.cells;
+  const CellsBefore& before = memory_.before;
+  std::copy_n(now.depth_m.data, now.depth_m.pixels(), before.depth_m.data);
+  std::copy_n(now.luma.data, now.luma.pixels(), before.luma.data);
+  std::copy_n(now.crept_m.data, now.crept_m.pixels(), before.crept_m.data);
+  std::copy_n(now.dynamic.data, now.dynamic.pixels(), before.dynamic.data);
+  std::copy_n(now.still.data, now.still.pixels(), before.still.data);
+}
+
+TrackResult CpuEngine::register_to_map(const Se3& T_start, ImageView<const uint8_t> trust, LevelRange levels,
+                                       const PosePrior& prior) {
   struct Context {
     CpuEngine* engine;
     TrackPass pass;
@@ -362,7 +380,7 @@ TrackResult CpuEngine::register_to_map(const Se3& T_start, ImageView<const uint8
                           },
                           &context};
   return register_frame(runner, T_start, params_.track, levels,
-                        scaled_pixels(params_.depth.min_valid_pixels, k()));
+                        scaled_pixels(params_.depth.min_valid_pixels, k()), prior);
 }
 
 MaskResult CpuEngine::mask(const Se3& T_world_cam) {
@@ -415,7 +433,8 @@ void CpuEngine::mask_by_residual(const Se3& T_world_cam) {
 
 void CpuEngine::update_static_depth() {
   DepthRangePyramid& ranges = memory_.ranges;
-  const StaticDepthPass pass{memory_.depth_m, memory_.mask, memory_.static_depth_m, ranges.level[0]};
+  const StaticDepthPass pass{memory_.depth_m, memory_.mask, params_.integrate.through_movers,
+                             memory_.static_depth_m, ranges.level[0]};
   pool_.for_each(static_cast<uint32_t>(pass.tiles.rows),
                  [&](uint32_t row) { loops_.static_depth(pass, static_cast<int32_t>(row)); });
   for (int32_t l = 1; l < ranges.levels; ++l) {
@@ -503,7 +522,7 @@ IntegrateResult CpuEngine::integrate(const Se3& T_world_cam) {
                            memory_.luma_chroma.data,
                            visible.T_cam_map,
                            {static_cast<float>(kSdfMax) / params_.map.truncation_m,
-                            static_cast<float>(params_.integrate.weight_cap)},
+                            static_cast<float>(params_.integrate.weight_cap), params_.integrate.relearn},
                            params_.integrate.free_space,
                            frames_};
   frames_ = (frames_ + 1) & 0xffff;

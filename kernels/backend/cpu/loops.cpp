@@ -134,6 +134,10 @@ void cell_evidence(const CellEvidencePass& pass, int32_t first_row, int32_t last
   for (int32_t r = first_row; r < last_row; ++r)
     for (int32_t c = 0; c < pass.cells.depth_m.cols; ++c) pass(r, c, cache);
 }
+void still_cells(const StillPass& pass, int32_t first_row, int32_t last_row) {
+  for (int32_t r = first_row; r < last_row; ++r)
+    for (int32_t c = 0; c < pass.cells.depth_m.cols; ++c) pass(r, c);
+}
 void static_pixels(const StaticPixelPass& pass, int32_t first_row, int32_t last_row) {
   for (int32_t r = first_row; r < last_row; ++r)
     for (int32_t c = 0; c < pass.depth_m.cols; ++c) pass(r, c);
@@ -190,7 +194,7 @@ void integrate(const IntegratePass& pass, View<const VisibleBlock> blocks) {
 
 extern const CpuLoops STILLMAP_LOOPS;
 const CpuLoops STILLMAP_LOOPS = {STILLMAP_LOOPS_NAME, prepare,       track,         residual_mask,
-                                 cell_depth,          cell_normals,  cell_evidence, static_pixels,
+                                 cell_depth,          cell_normals,  cell_evidence, still_cells, static_pixels,
                                  static_depth,        visible_group, integrate};
 
 }  // namespace stillmap

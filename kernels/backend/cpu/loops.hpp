@@ -27,6 +27,7 @@ struct CpuLoops {
   void (*cell_depth)(const CellDepthPass&, int32_t first_row, int32_t last_row);
   void (*cell_normals)(const CellNormalPass&, int32_t first_row, int32_t last_row);
   void (*cell_evidence)(const CellEvidencePass&, int32_t first_row, int32_t last_row);
+  void (*still_cells)(const StillPass&, int32_t first_row, int32_t last_row);
   void (*static_pixels)(const StaticPixelPass&, int32_t first_row, int32_t last_row);
   void (*static_depth)(const StaticDepthPass&, int32_t tile_row);
   GroupView (*visible_group)(const VisibleGroupPass&, uint32_t group);

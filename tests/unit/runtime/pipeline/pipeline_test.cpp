@@ -16,7 +16,7 @@ class ScriptedEngine : public Engine {
     calls += 'p';
     return {prepare_status, 1000};
   }
-  TrackResult track(const Se3& T_start) override {
+  TrackResult track(const Se3& T_start, const PosePrior&) override {
     calls += 't';
     track_start = T_start;
     return tracked;
@@ -26,7 +26,7 @@ class ScriptedEngine : public Engine {
     mask_pose = T;
     return {Status::ok, masked_pixels, masked_pixels};
   }
-  TrackResult refine(const Se3& T_start) override {
+  TrackResult refine(const Se3& T_start, const PosePrior&) override {
     calls += 'r';
     refine_start = T_start;
     return refined;
