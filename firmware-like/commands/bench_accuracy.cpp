@@ -73,10 +73,9 @@ std::string write_files(const std::string& out, const std::vector<AccuracyRun>& 
 }
 
 void print_bars(const std::vector<AccuracyRun>& runs) {
-  const std::string yardstick = yardstick_of(runs);
   for (const std::string& preset : presets_of(runs)) {
     fmt::print("\n{}\n", preset);
-    for (const Bar& bar : judge(runs, preset, yardstick))
+    for (const Bar& bar : judge(runs, preset, yardstick_for(runs, preset)))
       if (bar.verdict != Verdict::unknown)
         fmt::print("  {:<12} {}: {} {} ({}; limit {})\n", to_string(bar.verdict), bar.what,
                    number(bar.value, 2), bar.unit, bar.scene, number(bar.limit, 2));
@@ -100,6 +99,7 @@ int bench_accuracy(const BenchOptions& o) {
   for (const AccuracyJob& job : *jobs) {
     if (stop_requested()) break;
     AccuracyOutcome outcome = run_job(job, o.seeds == 1);
+    if (stop_requested()) break;  // it was cut short
     if (outcome.run.exit_code == kExitUsage || outcome.run.exit_code == kExitNoSource)
       return outcome.run.exit_code;
     all_good = all_good && outcome.run.error.empty();

@@ -87,9 +87,8 @@ std::string accuracy_json(const std::vector<AccuracyRun>& runs) {
     put_figures(row["worst"], s.worst);
     json["summary"].push_back(std::move(row));
   }
-  const std::string yardstick = yardstick_of(runs);
   for (const std::string& preset : presets_of(runs))
-    for (const Bar& bar : judge(runs, preset, yardstick))
+    for (const Bar& bar : judge(runs, preset, yardstick_for(runs, preset)))
       json["bars"].push_back({{"preset", preset},
                               {"bar", bar.what},
                               {"verdict", to_string(bar.verdict)},

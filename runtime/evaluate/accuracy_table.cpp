@@ -86,7 +86,24 @@ std::string table(const Part& part, const std::vector<AccuracyRun>& runs,
   return text + "\n";
 }
 
-std::string means(const std::vector<AccuracyRun>& runs) {
+/// Runs that every preset has: means over different scenes say nothing.
+std::vector<AccuracyRun> shared_runs(const std::vector<AccuracyRun>& runs) {
+  std::vector<AccuracyRun> shared;
+  const std::vector<std::string> presets = presets_of(runs);
+  for (const AccuracyRun& run : runs) {
+    const auto has_it = [&](const std::string& preset) {
+      return std::any_of(runs.begin(), runs.end(), [&](const AccuracyRun& other) {
+        return other.preset == preset && other.scene == run.scene && other.seed == run.seed &&
+               !std::isnan(other.figures.ate_rmse_m);
+      });
+    };
+    if (std::all_of(presets.begin(), presets.end(), has_it)) shared.push_back(run);
+  }
+  return shared;
+}
+
+std::string means(const std::vector<AccuracyRun>& all_runs) {
+  const std::vector<AccuracyRun> runs = shared_runs(all_runs);
   const std::string yardstick = yardstick_of(runs);
   const double yardstick_m = dynamic_mean_m(runs, yardstick);
   if (std::isnan(yardstick_m)) return {};
@@ -102,7 +119,8 @@ std::string means(const std::vector<AccuracyRun>& runs) {
 
 std::string bars(const std::vector<AccuracyRun>& runs, const std::string& preset,
                  const std::string& yardstick) {
-  std::string text = fmt::format("### Bars of `{}` (yardstick: `{}`)\n\n", preset, yardstick);
+  std::string text = fmt::format("### Bars of `{}`{}\n\n", preset,
+                                 yardstick.empty() ? "" : fmt::format(" (yardstick: `{}`)", yardstick));
   text += "| bar | worst at | value | limit | |\n|---|---|---|---|---|\n";
   for (const Bar& bar : judge(runs, preset, yardstick)) {
     if (bar.verdict == Verdict::unknown) {
@@ -132,15 +150,17 @@ std::string yardstick_of(const std::vector<AccuracyRun>& runs) {
   return std::find(presets.begin(), presets.end(), "paper") != presets.end() ? "paper" : presets.back();
 }
 
+std::string yardstick_for(const std::vector<AccuracyRun>& runs, const std::string& preset) {
+  const std::string yardstick = yardstick_of(runs);
+  return preset == yardstick ? std::string() : yardstick;
+}
+
 std::string accuracy_markdown(const std::vector<AccuracyRun>& runs) {
   const std::vector<AccuracySummary> summaries = summarise(runs);
   std::string text = "Median over the seeds, in brackets the worst of them.\n\n";
   for (const Part& part : parts()) text += table(part, runs, summaries);
   text += means(runs);
-  const std::string yardstick = yardstick_of(runs);
-  const std::vector<std::string> presets = presets_of(runs);
-  for (const std::string& preset : presets)
-    if (preset != yardstick || presets.size() == 1) text += bars(runs, preset, yardstick);
+  for (const std::string& preset : presets_of(runs)) text += bars(runs, preset, yardstick_for(runs, preset));
   return text;
 }
 

@@ -145,7 +145,15 @@ TEST(AccuracyTable, PresetsSideBySide) {
   EXPECT_NE(text.find("| `crowd` | 2.00 (3.00) | 10.00 (10.00) |"), std::string::npos) << text;
   EXPECT_NE(text.find("default 2.00 cm (0.20 of that of paper), paper 10.00 cm."), std::string::npos) << text;
   EXPECT_NE(text.find("### Bars of `default` (yardstick: `paper`)"), std::string::npos);
-  EXPECT_EQ(text.find("### Bars of `paper`"), std::string::npos);
+  EXPECT_NE(text.find("### Bars of `paper`\n"), std::string::npos);
+  EXPECT_NE(text.find("a third of the yardstick's | - | - | - | not measured |"), std::string::npos);
+}
+
+TEST(AccuracyTable, MeansAreOverTheScenesThatBothHave) {
+  const std::vector<AccuracyRun> runs = {run_of("crowd", "default", 0.02), run_of("crowd", "paper", 0.1),
+                                         run_of("balloon", "default", 5)};
+  const std::string text = accuracy_markdown(runs);
+  EXPECT_NE(text.find("default 2.00 cm (0.20 of that of paper)"), std::string::npos) << text;
 }
 
 }  // namespace
