@@ -114,6 +114,10 @@ TEST(AccuracyBars, CalibrationIsPooledOverScenes) {
 TEST(AccuracyBars, CoveredMayBeLost) {
   std::vector<AccuracyRun> runs = {run_of("covered,size=320x240", "default", 0.01)};
   runs[0].figures.declared_loss = 90;
+  runs[0].figures.in_view = 100;
+  runs[0].figures.in_view_good = 10;
+  EXPECT_EQ(bar_of(judge(runs, "default", "paper"), "static scenes: ATE under").verdict, Verdict::unknown);
+  EXPECT_EQ(bar_of(judge(runs, "default", "paper"), "at least 97 %").verdict, Verdict::unknown);
   EXPECT_EQ(bar_of(judge(runs, "default", "paper"), "no declared loss").verdict, Verdict::unknown);
   runs.push_back(run_of("static", "default", 0.01));
   runs[1].figures.declared_loss = 1;
