@@ -11,7 +11,10 @@
 #include "firmware-like/commands/bench_options.hpp"
 #include "firmware-like/commands/command.hpp"
 #include "firmware-like/commands/stop_signal.hpp"
+#include "runtime/evaluate/accuracy_bars.hpp"
 #include "runtime/evaluate/accuracy_files.hpp"
+#include "runtime/evaluate/accuracy_table.hpp"
+#include "runtime/picture/accuracy_picture.hpp"
 #include "runtime/record/output_file.hpp"
 
 namespace stillmap {
@@ -62,9 +65,21 @@ void print_row(const AccuracyRun& run) {
 /// Rows are kept as they come: a bench of hours that is stopped leaves what it measured.
 std::string write_files(const std::string& out, const std::vector<AccuracyRun>& runs) {
   for (const auto& [name, content] : {std::pair{"/accuracy.csv", accuracy_csv(runs)},
-                                      std::pair{"/accuracy.json", accuracy_json(runs) + "\n"}})
+                                      std::pair{"/accuracy.json", accuracy_json(runs) + "\n"},
+                                      std::pair{"/accuracy.md", accuracy_markdown(runs)}})
     if (std::string error = write_whole_file(out + name, content); !error.empty()) return error;
-  return {};
+  const auto drawn = write_accuracy_pictures(out, runs);
+  return drawn ? std::string() : drawn.error();
+}
+
+void print_bars(const std::vector<AccuracyRun>& runs) {
+  for (const std::string& preset : presets_of(runs)) {
+    fmt::print("\n{}\n", preset);
+    for (const Bar& bar : judge(runs, preset, yardstick_for(runs, preset)))
+      if (bar.verdict != Verdict::unknown)
+        fmt::print("  {:<12} {}: {} {} ({}; limit {})\n", to_string(bar.verdict), bar.what,
+                   number(bar.value, 2), bar.unit, bar.scene, number(bar.limit, 2));
+  }
 }
 
 }  // namespace
@@ -84,6 +99,7 @@ int bench_accuracy(const BenchOptions& o) {
   for (const AccuracyJob& job : *jobs) {
     if (stop_requested()) break;
     AccuracyOutcome outcome = run_job(job, o.seeds == 1);
+    if (stop_requested()) break;  // it was cut short
     if (outcome.run.exit_code == kExitUsage || outcome.run.exit_code == kExitNoSource)
       return outcome.run.exit_code;
     all_good = all_good && outcome.run.error.empty();
@@ -94,7 +110,10 @@ int bench_accuracy(const BenchOptions& o) {
     if (const std::string error = write_files(o.out, runs); !error.empty())
       return fail(error, ErrorKind::failed);
   }
-  if (o.json) fmt::print("{}\n", accuracy_json(runs));
+  if (o.json)
+    fmt::print("{}\n", accuracy_json(runs));
+  else
+    print_bars(runs);
   if (!calibration->close()) return fail(calibration->error(), ErrorKind::failed);
   return all_good ? kExitDone : kExitFailed;
 }

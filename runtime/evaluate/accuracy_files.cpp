@@ -5,6 +5,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "runtime/evaluate/accuracy_bars.hpp"
+#include "runtime/evaluate/accuracy_table.hpp"
 #include "runtime/evaluate/trajectory.hpp"
 
 namespace stillmap {
@@ -68,7 +70,7 @@ std::string calibration_csv(const AccuracyRun& run, const std::vector<FrameAgain
 }
 
 std::string accuracy_json(const std::vector<AccuracyRun>& runs) {
-  Json json = {{"runs", Json::array()}, {"summary", Json::array()}};
+  Json json = {{"runs", Json::array()}, {"summary", Json::array()}, {"bars", Json::array()}};
   for (const AccuracyRun& run : runs) {
     Json row = {{"scene", run.scene},
                 {"preset", run.preset},
@@ -85,6 +87,16 @@ std::string accuracy_json(const std::vector<AccuracyRun>& runs) {
     put_figures(row["worst"], s.worst);
     json["summary"].push_back(std::move(row));
   }
+  for (const std::string& preset : presets_of(runs))
+    for (const Bar& bar : judge(runs, preset, yardstick_for(runs, preset)))
+      json["bars"].push_back({{"preset", preset},
+                              {"bar", bar.what},
+                              {"verdict", to_string(bar.verdict)},
+                              {"scene", bar.scene},
+                              {"value", bar.value},
+                              {"limit", bar.limit},
+                              {"unit", bar.unit},
+                              {"cases", bar.cases}});
   return json.dump(2);
 }
 

@@ -17,7 +17,7 @@ std::string calibration_csv_head();
 /// A line a frame of one run.
 std::string calibration_csv(const AccuracyRun& run, const std::vector<FrameAgainstTruth>& frames);
 
-/// `{"runs": [...], "summary": [...]}`; unknown figures are null.
+/// `{"runs": [...], "summary": [...], "bars": [...]}`; unknown figures are null.
 std::string accuracy_json(const std::vector<AccuracyRun>& runs);
 
 }  // namespace stillmap

@@ -432,9 +432,14 @@ class Bench(Case):
         done = stillmap("bench", "accuracy", "--source", "synthetic:static,size=160x120,seconds=1", "--json", *LITTLE,
                         "--out", self.out)
         self.assertEqual(done.returncode, 0, done.stderr)
-        row = json.loads(done.stdout)[0]
-        self.assertEqual((row["frames"], row["exit_code"]), (30, 0))
-        self.assertLess(row["ate_rmse_m"], 0.05)
+        rows = json.loads(done.stdout)["runs"]
+        self.assertEqual([row["preset"] for row in rows], ["default", "paper"])
+        for row in rows:
+            self.assertEqual((row["frames"], row["exit_code"]), (30, 0))
+            self.assertLess(row["ate_rmse_m"], 0.05)
+        for name in ["accuracy.csv", "accuracy.json", "accuracy.md", "calibration.csv", "ate.png"]:
+            self.assertTrue((self.out / name).is_file(), name)
+        self.assertEqual(len(read_csv(self.out / "calibration.csv")), 1 + 2 * 30)
 
 
 if __name__ == "__main__":
