@@ -74,6 +74,7 @@ struct TrackParams {
   float lost_inlier_ratio = 0.2f;
   float poor_inlier_ratio = 0.4f;
   float inlier_m = 0.03f;
+  float correlated_points = 80.0f;
 
   template <class F>
   static void fields(F&& f) {
@@ -131,6 +132,8 @@ struct TrackParams {
     f("poor_inlier_ratio", &P::poor_inlier_ratio, 0, 1.0, "1", "ours", "poor below this share");
     f("inlier_m", &P::inlier_m, 1e-3, 1.0, "m", "ours",
       "a point this near to the mapped surface is an inlier");
+    f("correlated_points", &P::correlated_points, 1, 1e5, "points of 640x480", "ours",
+      "so many points err together: the covariance of the pose is larger by this");
   }
 };
 

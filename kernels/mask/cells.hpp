@@ -25,6 +25,9 @@ STILLMAP_HD int32_t cell_px_for(int32_t image_cols) {
 using Contradiction = float;
 constexpr Contradiction kUnknown = -1.0f;  ///< no measurement, or nothing was ever observed there
 
+constexpr uint8_t kDoubted =
+    1;  ///< of an expected mask: static, but not what the map says; no help to tracking
+
 /// Standard deviation of a depth measurement, metres.
 struct DepthNoise {
   float close_m = 0.001f, per_m2 = 0.0015f;
@@ -50,7 +53,7 @@ struct CellGrid {
   ImageView<CellResidual> residual;
   ImageView<float> crept_m;     ///< how far it has gone along its normal in that time
   ImageView<uint8_t> still;     ///< frames that the surface in a cell has been where it is, at most 255
-  ImageView<uint8_t> expected;  ///< 255: dynamic by the last frame's mask, carried into this one
+  ImageView<uint8_t> expected;  ///< kDoubted, or 255: dynamic by the last frame's mask, carried into this one
   ImageView<uint8_t> dynamic;   ///< 255: dynamic
   ImageView<int32_t> part;      ///< number of the connected part a cell belongs to; < 0: none
 
@@ -240,6 +243,7 @@ struct StaticPixelPass {
       const float s = z_m / trust_area_m;
       t *= fminf(1.0f, s * s);
     }
+    if (mask.data && cells.evidence.at(r, c) >= 0.5f) t = 0.0f;
     if (dynamic) t *= mask.data ? 0.0f : expected_trust;
     trust.at(row, col) = static_cast<uint8_t>(t + 0.5f);
   }

@@ -163,7 +163,7 @@ void gather_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory
       const Contradiction contradiction = cells.evidence.at(r, c);
       ++part.cells;
       part.still += cells.still.at(r, c) >= params.reabsorb_frames;
-      part.expected += cells.expected.at(r, c) != 0;
+      part.expected += cells.expected.at(r, c) > kDoubted;
       const float area_m2 = cell_area_m2(cells, r, c);
       part.area_m2 += area_m2;
       part.noise_m += noise.at(cells.depth_m.at(r, c));
@@ -312,7 +312,7 @@ void decide_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory
     part.moved = believe_moves && has_moved(part, params, usual * (was ? 0.7f : 1.0f));
     const bool contradicts =
         part.contradicts_m2 >= params.blob_m2 && share > (was ? params.share_off : params.share_on);
-    const bool settled = params.reabsorb_frames < 255 && 5 * part.still > 4 * part.cells;
+    const bool settled = params.reabsorb_frames < 255 && 5 * part.still > 3 * part.cells;
     part.dynamic = !settled && (part.moved || contradicts || (was && hardly_known));
   }
   for (int32_t i = 0; i < cells.part.pixels(); ++i) {
@@ -348,7 +348,7 @@ void carry_mask(const ImageView<const float>& depth_before_m, const ImageView<co
       for (int32_t i = 0; i < 4; ++i) {  // the four cells around: no holes
         const int32_t nr = row + (i >> 1), nc = col + (i & 1);
         if (now.depth_m.contains(nr, nc) && std::fabs(now.depth_m.at(nr, nc) - p.z) < kMoved_m)
-          now.expected.at(nr, nc) = kSet;
+          now.expected.at(nr, nc) = std::max(now.expected.at(nr, nc), dynamic_before.at(r, c));
       }
     }
 }

@@ -171,11 +171,11 @@ class StepComparison {
   }
 
   /// @return the reference's pose
-  Se3 registered(TrackResult (Engine::*step)(const Se3&), const Se3& T_start, PoseDifference& worst,
-                 Timer& timer) {
-    const TrackResult expected = (reference_.*step)(T_start);
+  Se3 registered(TrackResult (Engine::*step)(const Se3&, const PosePrior&), const Se3& T_start,
+                 PoseDifference& worst, Timer& timer) {
+    const TrackResult expected = (reference_.*step)(T_start, {});
     timer.start();
-    const TrackResult got = (candidate_.*step)(T_start);
+    const TrackResult got = (candidate_.*step)(T_start, {});
     timer.stop();
     const Se3d off = inverse(cast<double>(expected.T_world_cam)) * cast<double>(got.T_world_cam);
     worst.m.add(norm(off.translation));

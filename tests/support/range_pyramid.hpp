@@ -28,7 +28,7 @@ class RangePyramid {
 
   /// @param mask without data: nothing is masked
   void build(ImageView<const float> depth_m, ImageView<const uint8_t> mask) {
-    const StaticDepthPass pass{depth_m, mask, static_image(), view_.level[0]};
+    const StaticDepthPass pass{depth_m, mask, false, static_image(), view_.level[0]};
     for (int32_t r = 0; r < pass.tiles.rows; ++r)
       for (int32_t c = 0; c < pass.tiles.cols; ++c) pass(r, c);
     for (int32_t l = 1; l < view_.levels; ++l)

@@ -354,7 +354,7 @@ class Trouble(Case):
 
     def test_disk_that_fills_up_during_the_run(self):
         def limit():
-            resource.setrlimit(resource.RLIMIT_FSIZE, (12000, 12000))
+            resource.setrlimit(resource.RLIMIT_FSIZE, (14000, 14000))
 
         done = stillmap("run", "--source", "synthetic:crowd,size=160x120,seconds=6", *LITTLE, "--out", self.out,
                         preexec_fn=limit)

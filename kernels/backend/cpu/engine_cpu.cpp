@@ -47,6 +47,12 @@ float reach_m(const EngineParams& p) {
   return far_plane_m(p) * std::sqrt(1.0f + x * x + y * y);
 }
 
+/// Neighbouring points err together, the more of them the finer the picture.
+float correlated_points(const EngineParams& p) {
+  const float pixels = static_cast<float>(p.camera.k.width) * static_cast<float>(p.camera.k.height);
+  return std::max(1.0f, p.track.correlated_points * pixels / (640.0f * 480.0f));
+}
+
 float group_m(const MapParams& map) {
   return map.voxel_m * static_cast<float>(kBlockEdge * kGroupEdge);
 }
@@ -350,7 +356,10 @@ void CpuEngine::remember_cells() {
   std::copy_n(now.depth_m.data, now.depth_m.pixels(), before.depth_m.data);
   std::copy_n(now.luma.data, now.luma.pixels(), before.luma.data);
   std::copy_n(now.crept_m.data, now.crept_m.pixels(), before.crept_m.data);
-  std::copy_n(now.dynamic.data, now.dynamic.pixels(), before.dynamic.data);
+  for (int32_t i = 0; i < now.dynamic.pixels(); ++i)
+    before.dynamic.data[i] = now.dynamic.data[i]            ? kMasked
+                             : now.evidence.data[i] >= 0.5f ? kDoubted
+                                                            : uint8_t{0};
   std::copy_n(now.still.data, now.still.pixels(), before.still.data);
 }
 
@@ -379,8 +388,10 @@ TrackResult CpuEngine::register_to_map(const Se3& T_start, ImageView<const uint8
                             return sums;
                           },
                           &context};
-  return register_frame(runner, T_start, params_.track, levels,
-                        scaled_pixels(params_.depth.min_valid_pixels, k()), prior);
+  TrackResult result = register_frame(runner, T_start, params_.track, levels,
+                                      scaled_pixels(params_.depth.min_valid_pixels, k()), prior);
+  for (float& c : result.covariance) c *= correlated_points(params_);
+  return result;
 }
 
 MaskResult CpuEngine::mask(const Se3& T_world_cam) {

@@ -193,8 +193,8 @@ void integrate(const IntegratePass& pass, View<const VisibleBlock> blocks) {
 }  // namespace
 
 extern const CpuLoops STILLMAP_LOOPS;
-const CpuLoops STILLMAP_LOOPS = {STILLMAP_LOOPS_NAME, prepare,       track,         residual_mask,
-                                 cell_depth,          cell_normals,  cell_evidence, still_cells, static_pixels,
-                                 static_depth,        visible_group, integrate};
+const CpuLoops STILLMAP_LOOPS = {STILLMAP_LOOPS_NAME, prepare,      track,         residual_mask,
+                                 cell_depth,          cell_normals, cell_evidence, still_cells,
+                                 static_pixels,       static_depth, visible_group, integrate};
 
 }  // namespace stillmap

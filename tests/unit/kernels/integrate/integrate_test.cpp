@@ -73,6 +73,16 @@ TEST_F(ObserveTest, NoMeasurementSaysNothing) {
   for (float z_m = 0.1f; z_m < 5; z_m += 0.1f) EXPECT_FALSE(at(1, 1, z_m).free || at(1, 1, z_m).band);
 }
 
+TEST_F(ObserveTest, BeforeAMoverItIsFreeAndAtItNothingIsKnown) {
+  for (int32_t i = 0; i < depth_.view().pixels(); ++i) depth_.view().data[i] = -2.0f;
+  EXPECT_TRUE(at(1, 1, 1.0f).free);
+  EXPECT_TRUE(at(1, 1, 2.0f - 0.05f).free);  // nearer than tau: no surface is fused there
+  for (const float z_m : {2.0f - 0.03f, 2.0f, 2.05f, 3.0f}) {
+    EXPECT_FALSE(at(1, 1, z_m).free) << z_m;
+    EXPECT_FALSE(at(1, 1, z_m).band) << z_m;
+  }
+}
+
 TEST_F(ObserveTest, TooFarAMeasurementFreesUpToTheClippingPlaneAndFusesNothing) {
   depth_.view().at(1, 1) = 4.5f;  // max_m is 4, the clipping plane 3
   for (float z_m = 0.35f; z_m < 6; z_m += 0.1f) {
@@ -200,6 +210,22 @@ TEST(Fused, WhatIsSeenFreeLongEnoughIsExactlyFree) {
       EXPECT_LT(frames, 9 * (static_cast<int>(cap) + 2));
       EXPECT_EQ(v.luma, 100.0f);  // free space has no colour to give
     }
+}
+
+TEST(Fused, RelearningTurnsAFreeVoxelAtOnceAndLeavesASurfaceAlone) {
+  FuseWeights quick = kWeights;
+  quick.relearn = true;
+  const float tau = static_cast<float>(kSdfMax);
+  const Observation<float> surface = {false, true, 0.0f, 0};
+  VoxelState<float> slow = {tau, 0, 64, 0, 128, 128}, fast = slow, known = {0.1f * tau, 0, 64, 64, 128, 128};
+  for (int i = 0; i < 8; ++i) {
+    slow = fused(slow, surface, 0.0f, 128.0f, 128.0f, kWeights, 0.0f);
+    fast = fused(fast, surface, 0.0f, 128.0f, 128.0f, quick, 0.0f);
+    known = fused(known, surface, 0.0f, 128.0f, 128.0f, quick, 0.0f);
+  }
+  EXPECT_GT(slow.sdf, 0.8f * tau);
+  EXPECT_LT(fast.sdf, 0.5f * tau);
+  EXPECT_EQ(known.weight, 64.0f);
 }
 
 TEST(Fused, AFreeVoxelThatIsFoundOccupiedTurnsWithinTheCap) {

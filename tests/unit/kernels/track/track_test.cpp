@@ -382,12 +382,13 @@ struct Script {
   double step_m = 0.01;
   std::vector<Se3> asked = {};
 
-  TrackResult run(const TrackParams& params, const Se3& T_start = {}, int32_t min_points = 10) {
+  TrackResult run(const TrackParams& params, const Se3& T_start = {}, int32_t min_points = 10,
+                  const PosePrior& prior = {}) {
     const PassRunner runner{[](void* context, const Se3& T_map_cam, int32_t) {
                               return static_cast<Script*>(context)->answer(T_map_cam);
                             },
                             this};
-    return register_frame(runner, T_start, params, {params.levels - 1, 0}, min_points);
+    return register_frame(runner, T_start, params, {params.levels - 1, 0}, min_points, prior);
   }
   NormalEq answer(const Se3& T_map_cam) {
     const size_t call = asked.size();
@@ -412,6 +413,39 @@ TrackParams one_level(int32_t iterations) {
   p.levels = 1;
   p.iterations_fine = iterations;
   return p;
+}
+
+TEST(RegisterFrame, APriorHoldsThePoseAsFarAsItIsWorth) {
+  TrackParams params = one_level(1);
+  params.damping_initial = 0;
+  params.prior_point_m = 1.0f;  // information counts as it is
+  const auto moved_m = [&](float information) {
+    Script script{{1.0, 0.5}};
+    PosePrior prior;
+    prior.information[0] = information;  // of x
+    return -script.run(params, {}, 10, prior).T_world_cam.translation.x;
+  };
+  EXPECT_NEAR(moved_m(0), 0.01f, 1e-5f);
+  EXPECT_NEAR(moved_m(1), 0.005f, 1e-5f);  // the points have a Hessian of 1
+  EXPECT_NEAR(moved_m(99), 0.0001f, 1e-6f);
+}
+
+TEST(Kernels, HuberKeepsPullingAndGemanMcClureLetsGo) {
+  const auto pull = [](Robust<float> r, float size) { return r.weight * size; };
+  EXPECT_FLOAT_EQ(huber(0.01f, 0.02f).weight, 1.0f);
+  EXPECT_FLOAT_EQ(pull(huber(0.2f, 0.02f), 0.2f), 0.02f);
+  EXPECT_NEAR(geman_mcclure(1e-6f, 0.02f).weight, 1.0f, 0.01f);
+  EXPECT_LT(pull(geman_mcclure(0.04f, 0.02f), 0.2f), 0.0001f);
+  // Half of the slope of the cost is weight times error, for both.
+  for (const float e : {0.005f, 0.015f, 0.05f}) {
+    const float d = 1e-4f;
+    const float slope_h = (huber(e + d, 0.02f).cost - huber(e - d, 0.02f).cost) / (4 * d);
+    EXPECT_NEAR(slope_h, pull(huber(e, 0.02f), e), 2e-4f);
+    const float slope_g =
+        (geman_mcclure((e + d) * (e + d), 0.02f).cost - geman_mcclure((e - d) * (e - d), 0.02f).cost) /
+        (4 * d);
+    EXPECT_NEAR(slope_g, pull(geman_mcclure(e * e, 0.02f), e), 2e-4f);
+  }
 }
 
 TEST(RegisterFrame, AcceptsAStepThatLowersTheCost) {

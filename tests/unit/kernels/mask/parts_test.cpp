@@ -1,0 +1,310 @@
+#include "kernels/mask/parts.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+namespace stillmap {
+namespace {
+
+constexpr int32_t kRows = 60, kCols = 80;
+constexpr float kWallM = 3.0f, kNearM = 1.5f;
+
+/// A rectangle of cells, ends excluded.
+struct Patch {
+  int32_t row0, row1, col0, col1;
+
+  bool holds(int32_t r, int32_t c) const { return r >= row0 && r < row1 && c >= col0 && c < col1; }
+};
+
+/// A grid that looks at a wall, all of which agrees with the map.
+class PartsTest : public testing::Test {
+ protected:
+  PartsTest() {
+    cells.px = 1;
+    cells.k = {80, 80, 40, 30, kCols, kRows};
+    cells.depth_m = image(depth, kWallM);
+    cells.luma = image(luma, 20000.0f);
+    cells.normal = image(normal, Vec3{0, 0, -1});
+    cells.evidence = image(evidence, 0.0f);
+    cells.residual = image(residual, CellResidual{});
+    cells.crept_m = image(crept, 0.0f);
+    cells.still = image(still, uint8_t{0});
+    cells.expected = image(expected, uint8_t{0});
+    cells.dynamic = image(dynamic, uint8_t{0});
+    cells.part = image(part, int32_t{-1});
+    before = {image(depth_before, kWallM), image(luma_before, 20000.0f), image(crept_before, 0.0f),
+              image(dynamic_before, uint8_t{0}), image(still_before, uint8_t{9})};
+    memory.border = image(border, uint8_t{0});
+    memory.scratch = image(scratch, uint8_t{0});
+    parts.resize(kRows * kCols);
+    queue.resize(kRows * kCols);
+    memory.parts = {parts.data(), kRows * kCols};
+    memory.queue = {queue.data(), kRows * kCols};
+  }
+
+  template <class T>
+  ImageView<T> image(std::vector<T>& data, T value) {
+    data.assign(kRows * kCols, value);
+    return {data.data(), kRows, kCols, kCols};
+  }
+  template <class F>
+  void in(const Patch& patch, const F& f) {
+    for (int32_t r = patch.row0; r < patch.row1; ++r)
+      for (int32_t c = patch.col0; c < patch.col1; ++c) f(r, c);
+  }
+  void put(const Patch& patch, float depth_m, Contradiction contradiction) {
+    in(patch, [&](int32_t r, int32_t c) {
+      cells.depth_m.at(r, c) = depth_m;
+      cells.evidence.at(r, c) = contradiction;
+    });
+  }
+  void find_normals() {
+    const CellNormalPass pass{cells};
+    in({0, kRows, 0, kCols}, pass);
+  }
+  int32_t decide() {
+    const int32_t count = segment(cells, memory, params, noise);
+    gather_parts(cells, count, memory, params);
+    agree_on_motion(count, memory, params, usual);
+    decide_parts(cells, count, memory, params, usual);
+    return count;
+  }
+  int32_t dynamic_cells(const Patch& where = {0, kRows, 0, kCols}) {
+    int32_t n = 0;
+    in(where, [&](int32_t r, int32_t c) { n += cells.dynamic.at(r, c) != 0; });
+    return n;
+  }
+  /// The surface of the patch lies `off` from where the map has it, with normals that show all directions.
+  void shift(const Patch& patch, Vec3 off_m) {
+    in(patch, [&](int32_t r, int32_t c) {
+      const float u = 0.5f * std::sin(0.9f * static_cast<float>(r)),
+                  v = 0.5f * std::cos(0.7f * static_cast<float>(c));
+      const Vec3 n = normalized(Vec3{u, v, -1});
+      CellResidual& cell = cells.residual.at(r, c);
+      cell.terms = {};
+      cell.terms.depth_gradient = n;
+      cell.terms.depth_residual_m = dot(n, off_m);
+      cell.terms.depth_weight = 1;
+      cell.arm = cells.point(r, c);
+      cell.weight = 1;
+    });
+  }
+
+  CellGrid cells;
+  CellsBefore before;
+  PartMemory memory;
+  MaskParams params;
+  DepthNoise noise;
+  float usual = 1.0f;
+
+ private:
+  std::vector<float> depth, luma, evidence, crept, depth_before, luma_before, crept_before;
+  std::vector<Vec3> normal;
+  std::vector<CellResidual> residual;
+  std::vector<uint8_t> still, expected, dynamic, dynamic_before, still_before, border, scratch;
+  std::vector<int32_t> part, queue;
+  std::vector<Part> parts;
+};
+
+constexpr Patch kBox = {20, 40, 30, 50};
+
+TEST_F(PartsTest, AJumpInDepthPartsTwoSurfaces) {
+  put(kBox, kNearM, 0);
+  EXPECT_EQ(segment(cells, memory, params, noise), 2);
+  EXPECT_NE(cells.part.at(30, 40), cells.part.at(5, 5));
+  EXPECT_EQ(cells.part.at(5, 5), cells.part.at(55, 75));
+}
+
+TEST_F(PartsTest, AConcaveBendPartsTwoWallsOfACornerAndAConvexOneDoesNotPartABall) {
+  for (int32_t r = 0; r < kRows; ++r)
+    for (int32_t c = 0; c < kCols; ++c)
+      cells.depth_m.at(r, c) = kWallM - 0.03f * std::fabs(static_cast<float>(c - 40));
+  find_normals();
+  EXPECT_EQ(segment(cells, memory, params, noise), 2);
+  EXPECT_NE(cells.part.at(30, 10), cells.part.at(30, 70));
+
+  for (int32_t r = 0; r < kRows; ++r)
+    for (int32_t c = 0; c < kCols; ++c) {
+      const float d2 = static_cast<float>((r - 30) * (r - 30) + (c - 40) * (c - 40)) / 900.0f;
+      cells.depth_m.at(r, c) = d2 < 0.8f ? 1.5f - 0.5f * std::sqrt(1.0f - d2) : 0.0f;
+    }
+  find_normals();
+  EXPECT_EQ(segment(cells, memory, params, noise), 1);
+}
+
+TEST_F(PartsTest, APartThatContradictsTheMapIsDynamicAndNothingElse) {
+  put(kBox, kNearM, 1);
+  decide();
+  EXPECT_EQ(dynamic_cells(kBox), 400);
+  EXPECT_EQ(dynamic_cells(), 400);
+}
+
+TEST_F(PartsTest, TheWholePartGoesWithWhatMostOfItSays) {
+  put(kBox, kNearM, 1);
+  put({20, 24, 30, 50}, kNearM, kUnknown);  // its top is in space that was never seen
+  put({38, 40, 30, 50}, kNearM, 0);         // its foot stands near something that was
+  decide();
+  EXPECT_EQ(dynamic_cells(kBox), 400);
+}
+
+TEST_F(PartsTest, WhatWasDynamicStaysSoOnLessEvidence) {
+  put(kBox, kNearM, 0.35f);
+  decide();
+  EXPECT_EQ(dynamic_cells(), 0);
+  in(kBox, [&](int32_t r, int32_t c) { cells.expected.at(r, c) = 255; });
+  params.moved_m2 = 10;  // no large area that agrees is let go
+  decide();
+  EXPECT_EQ(dynamic_cells(kBox), 400);
+  params.warp = false;
+  decide();
+  EXPECT_EQ(dynamic_cells(), 0);
+}
+
+TEST_F(PartsTest, ABlobOnAWallIsDynamicAndARimIsNot) {
+  put({10, 11, 5, 70}, kWallM, 1);
+  decide();
+  EXPECT_EQ(dynamic_cells(), 0);
+  put({30, 38, 30, 38}, kWallM, 1);
+  params.grow_m = 0;
+  decide();
+  EXPECT_EQ(dynamic_cells(), 64);
+}
+
+TEST_F(PartsTest, TheMaskGrowsInMetresOverWhatTouchesIt) {
+  put({30, 38, 30, 38}, kWallM, 1);
+  put({20, 50, 38, 60}, kNearM, 0);  // in front, beside it
+  params.grow_m = 0.08f;             // 2.1 cells of the wall
+  decide();
+  EXPECT_EQ(dynamic_cells({20, 50, 38, 60}), 0);
+  EXPECT_EQ(dynamic_cells(), 64 + 2 * 8 + 2 * 2 * 10);
+}
+
+TEST_F(PartsTest, WhatStoodStillForLongIsStaticAgain) {
+  put(kBox, kNearM, 1);
+  in(kBox, [&](int32_t r, int32_t c) { cells.still.at(r, c) = 61; });
+  decide();
+  EXPECT_EQ(dynamic_cells(), 0);
+  params.reabsorb_frames = 255;
+  decide();
+  EXPECT_EQ(dynamic_cells(), 400);
+}
+
+TEST_F(PartsTest, AStandUnderAThingThatWasPutDownStaysStatic) {
+  put({10, 34, 30, 50}, kNearM, 1);
+  put({34, 55, 30, 50}, kNearM, 0);
+  params.grow_m = 0;
+  decide();
+  EXPECT_EQ(dynamic_cells({10, 34, 30, 50}), 24 * 20);
+  EXPECT_EQ(dynamic_cells({34, 55, 30, 50}), 0);
+}
+
+TEST_F(PartsTest, TheLargerSpaceDecidesWhatMovesNotTheLargerPicture) {
+  const Patch box = {0, kRows, 10, 70};  // three quarters of the picture, a fifth of the space
+  put(box, 0.7f, 0);
+  shift({0, kRows, 0, kCols}, {});
+  shift(box, {0.02f, 0, 0.01f});
+  const int32_t count = segment(cells, memory, params, noise);
+  gather_parts(cells, count, memory, params);
+  const Twistd motion = agree_on_motion(count, memory, params, usual);
+  EXPECT_LT(norm(motion.v), 0.002);
+  decide_parts(cells, count, memory, params, usual);
+  EXPECT_EQ(dynamic_cells(box), 60 * kRows);
+  EXPECT_EQ(dynamic_cells(), 60 * kRows);
+}
+
+TEST_F(PartsTest, WhenTheCameraMovedNothingElseDid) {
+  put(kBox, kNearM, 0);
+  shift({0, kRows, 0, kCols}, {0.02f, -0.01f, 0.01f});
+  const int32_t count = segment(cells, memory, params, noise);
+  gather_parts(cells, count, memory, params);
+  const Twistd motion = agree_on_motion(count, memory, params, usual);
+  EXPECT_NEAR(motion.v.x, -0.02, 0.002);
+  EXPECT_NEAR(motion.v.y, 0.01, 0.002);
+  decide_parts(cells, count, memory, params, usual);
+  EXPECT_EQ(dynamic_cells(), 0);
+}
+
+TEST_F(PartsTest, ASensorWithWarpedDepthRaisesWhatIsUsual) {
+  put(kBox, kNearM, 0);
+  shift({0, kRows, 0, kCols}, {});
+  shift({0, 20, 0, kCols}, {0, 0, 0.03f});  // nothing fits: half of the wall, too
+  const int32_t count = segment(cells, memory, params, noise);
+  gather_parts(cells, count, memory, params);
+  agree_on_motion(count, memory, params, usual);
+  EXPECT_GE(usual, 1.0f);
+  const float high = usual = 4.0f;
+  shift({0, kRows, 0, kCols}, {});
+  gather_parts(cells, count, memory, params);
+  agree_on_motion(count, memory, params, usual);
+  EXPECT_LT(usual, high);
+  EXPECT_GT(usual, 3.9f);  // it comes down in seconds, not at once
+}
+
+TEST_F(PartsTest, TheLastMaskIsCarriedIntoThisFrame) {
+  in(kBox, [&](int32_t r, int32_t c) {
+    before.dynamic.at(r, c) = 255;
+    before.depth_m.at(r, c) = kNearM;
+  });
+  put({20, 40, 40, 60}, kNearM, 0);  // the camera turned: ten cells to the right
+  const float angle = std::atan(10.0f / 80.0f);
+  carry_mask(before.depth_m, before.dynamic, exp(Twist{{}, {0, angle, 0}}), cells);
+  int32_t inside = 0, all = 0;
+  in({0, kRows, 0, kCols}, [&](int32_t r, int32_t c) {
+    all += cells.expected.at(r, c) != 0;
+    inside += cells.expected.at(r, c) != 0 && Patch{20, 40, 40, 60}.holds(r, c);
+  });
+  EXPECT_GT(inside, 340);
+  EXPECT_EQ(inside, all);  // never onto another surface
+}
+
+TEST_F(PartsTest, StandingStillIsCountedAndMovingOrCreepingIsNot) {
+  StillPass pass{cells, before, {}, noise};
+  const auto after = [&](int32_t r, int32_t c) {
+    pass(r, c);
+    return static_cast<int>(cells.still.at(r, c));
+  };
+  EXPECT_EQ(after(30, 40), 10);
+  cells.luma.at(30, 40) = 40000.0f;  // another brightness: some of the count is lost
+  EXPECT_EQ(after(30, 40), 1);
+  cells.depth_m.at(30, 41) = kNearM;  // something came in front
+  EXPECT_EQ(after(30, 41), 0);
+  cells.depth_m.at(30, 42) = kWallM + 0.01f;
+  EXPECT_EQ(after(30, 42), 10);
+  before.crept_m.at(30, 42) = -0.035f;  // and on and on
+  EXPECT_EQ(after(30, 42), 0);
+  EXPECT_EQ(cells.crept_m.at(30, 42), 0.0f);
+  cells.depth_m.at(30, 43) = 0;
+  EXPECT_EQ(after(30, 43), 0);
+}
+
+TEST_F(PartsTest, APixelBelongsToTheCellOfItsSurface) {
+  put(kBox, kNearM, 1);
+  in(kBox, [&](int32_t r, int32_t c) { cells.dynamic.at(r, c) = 255; });
+  std::vector<float> depth_m(kRows * kCols, kWallM);
+  std::vector<uint8_t> mask(kRows * kCols), trust(kRows * kCols);
+  depth_m[30 * kCols + 29] = kNearM;                    // beside the box, at its depth
+  depth_m[30 * kCols + 31] = kWallM;                    // within it, of the wall
+  depth_m[30 * kCols + 28] = 0.5f * (kNearM + kWallM);  // flying, not next to it
+  depth_m[31 * kCols + 29] = 0.5f * (kNearM + kWallM);  // flying beside it
+  StaticPixelPass pass{cells,
+                       {depth_m.data(), kRows, kCols, kCols},
+                       {mask.data(), kRows, kCols, kCols},
+                       {trust.data(), kRows, kCols, kCols},
+                       noise,
+                       0.01f,
+                       0.0f,
+                       0.1f};
+  for (int32_t r = 0; r < kRows; ++r)
+    for (int32_t c = 0; c < kCols; ++c) pass(r, c);
+  EXPECT_EQ(mask[30 * kCols + 29], 255);
+  EXPECT_EQ(mask[30 * kCols + 28], 0);
+  EXPECT_EQ(mask[31 * kCols + 29], 255);
+  EXPECT_EQ(trust[30 * kCols + 29], 0);
+  const float n = noise.at(kWallM);
+  EXPECT_NEAR(trust[0], 255.0f * 1e-4f / (1e-4f + n * n), 1.0f);
+}
+
+}  // namespace
+}  // namespace stillmap
