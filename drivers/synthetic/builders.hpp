@@ -21,6 +21,8 @@ Shape make_block(Vec3 low_m, Vec3 high_m, const Material& material);
 void furnished_room(World& world);
 /// Of the same size: painted walls with hardly any texture, four plain boxes.
 void bare_room(World& world);
+/// Eight furnished rooms of 5 x 4 m in two rows, 20 x 8 m together, joined to a ring by doors 1.1 m wide.
+void suite_of_rooms(World& world);
 
 /// Where a person is. The body is about 1.75 m tall, 0.55 m wide, and reaches 0.3 m to the front when
 /// walking.

@@ -152,6 +152,13 @@ struct Renderer::Hits {
   float y[kTile];
   float depth[kTile * kTile];
   int32_t index[kTile * kTile];
+
+  float farthest_m() const {
+    float farthest = 0.0f;
+    for (int32_t r = 0; r < rows; ++r)
+      for (int32_t c = 0; c < cols; ++c) farthest = larger(farthest, depth[r * kTile + c]);
+    return farthest;
+  }
 };
 
 Renderer::Renderer(const Intrinsics& k)
@@ -202,11 +209,19 @@ void Renderer::find_tiles(const Shape& shape, const Se3& T_cam_world, CastShape&
                      ? Vec3{shape.half_m.x, shape.half_m.x, shape.half_m.z + shape.half_m.x}
                      : shape.half_m;
   const Se3 T_cam_local = T_cam_world * shape.T_world_local;
-  float left = 1e9f, right = -1e9f, top = 1e9f, bottom = -1e9f;
-  int in_front = 0;
+  const float tan_left = (-0.5f - k_.cx) / k_.fx, tan_top = (-0.5f - k_.cy) / k_.fy;
+  const float tan_right = (static_cast<float>(k_.width) - 0.5f - k_.cx) / k_.fx;
+  const float tan_bottom = (static_cast<float>(k_.height) - 0.5f - k_.cy) / k_.fy;
+  float left = 1e9f, right = -1e9f, top = 1e9f, bottom = -1e9f, nearest_m = 1e9f;
+  int in_front = 0, out_left = 0, out_right = 0, out_top = 0, out_bottom = 0;
   for (int corner = 0; corner < 8; ++corner) {
     const Vec3 p =
         T_cam_local * Vec3{corner & 1 ? h.x : -h.x, corner & 2 ? h.y : -h.y, corner & 4 ? h.z : -h.z};
+    nearest_m = smaller(nearest_m, p.z);
+    out_left += p.x < tan_left * p.z ? 1 : 0;
+    out_right += p.x > tan_right * p.z ? 1 : 0;
+    out_top += p.y < tan_top * p.z ? 1 : 0;
+    out_bottom += p.y > tan_bottom * p.z ? 1 : 0;
     if (p.z < kNearM) continue;
     ++in_front;
     const Pixel px = project(k_, p);
@@ -215,7 +230,9 @@ void Renderer::find_tiles(const Shape& shape, const Se3& T_cam_world, CastShape&
     top = smaller(top, px.v);
     bottom = larger(bottom, px.v);
   }
-  if (in_front == 0) return;
+  // All corners beyond one side of the view: nothing of it is seen.
+  if (in_front == 0 || std::max({out_left, out_right, out_top, out_bottom}) == 8) return;
+  cast.nearest_m = nearest_m - kNearM;
   if (in_front < 8) left = top = -1e9f, right = bottom = 1e9f;  // reaches behind the camera: anywhere
   const auto tile_of = [](float pixel, int32_t tiles) {
     return static_cast<int32_t>(
@@ -241,12 +258,14 @@ void Renderer::render_tile(const World& world, const Se3d& T_world_cam, int32_t 
   }
   std::fill(std::begin(hits.depth), std::end(hits.depth), kMiss);
   std::fill(std::begin(hits.index), std::end(hits.index), 0);
+  float farthest_m = kMiss;
   for (size_t i = 0; i < cast_.size(); ++i) {
     const CastShape& c = cast_[i];
     if (tile_col < c.first_tile_col || tile_col > c.last_tile_col || tile_row < c.first_tile_row ||
-        tile_row > c.last_tile_row)
+        tile_row > c.last_tile_row || c.nearest_m > farthest_m)
       continue;
     intersect(c, static_cast<int32_t>(i), hits);
+    farthest_m = hits.farthest_m();
   }
   shade(world, cast<float>(T_world_cam).translation, hits, images);
 }

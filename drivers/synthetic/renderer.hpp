@@ -24,7 +24,7 @@ struct IdealImages {
 /// What a camera sees with a hand on its lens: dark, nearer than it can measure, all of it moving.
 void cover_lens(IdealImages& images);
 
-/// Ray caster: tiles, each with the shapes whose outline touches it.
+/// Ray caster: tiles, each with the shapes whose outline touches it and that are not behind all of its hits.
 /// @thread one caller at a time
 class Renderer {
  public:
@@ -43,6 +43,7 @@ class Renderer {
     Vec3 origin;
     Vec3 half_m;
     float radius = 0, half_axis = 0;
+    float nearest_m = 0;  ///< no point of it has a smaller depth
     int32_t first_tile_col = 0, last_tile_col = -1, first_tile_row = 0, last_tile_row = -1;
   };
   struct Hits;

@@ -166,6 +166,115 @@ void wall_prints(World& world) {
   add(world, make_block({-2.5f, 0.25f, 1.20f}, {-2.485f, 1.15f, 2.05f}, print({120, 60, 90}, 0.13f, 19)));
 }
 
+// ---- the suite: 4 x 2 rooms of 5 x 4 m, thick boxes between them
+
+constexpr Vec3 kSuiteHalfM = {10.0f, 4.0f, 1.3f};
+constexpr float kWallHalfM = 0.07f;
+constexpr float kDoorHalfM = 0.55f;
+constexpr float kDoorHeightM = 2.05f;
+
+/// Adds a piece that is made for the middle room (see above), turned to the left and moved.
+void put(World& world, void (*piece)(World&), float x, float y, int quarter_turns) {
+  World alone;
+  piece(alone);
+  const Se3 T_world_piece = {yaw_rotation(1.57079633f * static_cast<float>(quarter_turns)), {x, y, 0}};
+  for (Shape shape : alone.shapes) {
+    shape.T_world_local = T_world_piece * shape.T_world_local;
+    add(world, shape);
+  }
+}
+
+/// From (x0, y0) to (x1, y1), one of which pairs is equal.
+void inner_wall(World& world, float x0, float y0, float x1, float y1, const Material& material,
+                float from_z = 0.0f) {
+  const float thick_x = x0 == x1 ? kWallHalfM : 0.0f, thick_y = y0 == y1 ? kWallHalfM : 0.0f;
+  add(world, make_block({x0 - thick_x, y0 - thick_y, from_z},
+                        {x1 + thick_x, y1 + thick_y, 2.0f * kSuiteHalfM.z}, material));
+}
+
+Material wallpaper(uint32_t variant) {
+  const Vec3 tints[4] = {{206, 190, 160}, {170, 190, 176}, {176, 182, 206}, {204, 176, 170}};
+  const Vec3 ground = tints[variant % 4];
+  return {Pattern::wallpaper, ground, 0.78f * ground, 0.13f + 0.02f * static_cast<float>(variant % 3),
+          variant};
+}
+
+/// Walls across the suite, each with a door to the south and one to the north, and the one along it.
+void inner_walls(World& world) {
+  const struct {
+    float x, south_door, north_door;
+  } across[] = {{-5.0f, -1.60f, 1.70f}, {0.0f, -1.45f, 2.50f}, {5.0f, -2.40f, 1.50f}};
+  uint32_t variant = 1;
+  for (const auto& w : across) {
+    inner_wall(world, w.x, -kSuiteHalfM.y, w.x, w.south_door - kDoorHalfM, wallpaper(variant));
+    inner_wall(world, w.x, w.south_door + kDoorHalfM, w.x, w.north_door - kDoorHalfM, wallpaper(variant + 1));
+    inner_wall(world, w.x, w.north_door + kDoorHalfM, w.x, kSuiteHalfM.y, wallpaper(variant + 2));
+    for (const float door : {w.south_door, w.north_door})
+      inner_wall(world, w.x, door - kDoorHalfM, w.x, door + kDoorHalfM, wallpaper(variant), kDoorHeightM);
+    variant += 3;
+  }
+  const float east_door = 7.6f, west_door = -7.4f;
+  inner_wall(world, -kSuiteHalfM.x, 0, west_door - kDoorHalfM, 0, wallpaper(10));
+  inner_wall(world, west_door + kDoorHalfM, 0, -5.0f, 0, wallpaper(11));
+  inner_wall(world, -5.0f, 0, 0, 0, wallpaper(12));
+  inner_wall(world, 0, 0, 5.0f, 0, wallpaper(13));
+  inner_wall(world, 5.0f, 0, east_door - kDoorHalfM, 0, wallpaper(14));
+  inner_wall(world, east_door + kDoorHalfM, 0, kSuiteHalfM.x, 0, wallpaper(15));
+  for (const float door : {west_door, east_door})
+    inner_wall(world, door - kDoorHalfM, 0, door + kDoorHalfM, 0, wallpaper(16), kDoorHeightM);
+}
+
+/// Prints that stick out of a wall on its two sides; of the outer walls one sees only the inner side.
+void suite_prints(World& world) {
+  const struct {
+    float x, y;  ///< middle, in the plane of the wall
+    float width, low, high;
+    bool across;  ///< on a wall along y
+  } prints[] = {{-5.0f, -3.0f, 1.0f, 1.1f, 2.0f, true},  {-5.0f, 0.55f, 0.8f, 1.2f, 2.1f, true},
+                {0.0f, -3.1f, 1.1f, 2.1f, 2.45f, true},  {0.0f, 1.1f, 1.0f, 1.0f, 1.9f, true},
+                {0.0f, 3.55f, 0.6f, 1.2f, 2.0f, true},   {5.0f, -1.0f, 0.9f, 1.1f, 2.0f, true},
+                {5.0f, 3.0f, 1.2f, 1.2f, 2.1f, true},    {5.0f, -3.5f, 0.7f, 1.3f, 1.9f, true},
+                {-9.0f, 0.0f, 1.1f, 1.1f, 1.9f, false},  {-5.9f, 0.0f, 0.9f, 1.2f, 2.1f, false},
+                {-3.6f, 0.0f, 0.8f, 1.3f, 2.0f, false},  {-1.2f, 0.0f, 1.0f, 1.3f, 2.2f, false},
+                {0.8f, 0.0f, 0.9f, 1.2f, 1.9f, false},   {4.0f, 0.0f, 1.1f, 1.1f, 2.0f, false},
+                {6.0f, 0.0f, 1.0f, 1.1f, 2.1f, false},   {9.1f, 0.0f, 0.9f, 1.2f, 2.0f, false},
+                {-9.3f, -4.0f, 0.7f, 1.1f, 2.0f, false}, {-6.2f, -4.0f, 1.2f, 1.0f, 1.8f, false},
+                {-4.3f, -4.0f, 0.9f, 1.2f, 2.0f, false}, {1.3f, -4.0f, 1.1f, 1.1f, 2.1f, false},
+                {3.2f, -4.0f, 1.0f, 1.3f, 2.0f, false},  {5.7f, -4.0f, 0.9f, 1.1f, 1.9f, false},
+                {9.0f, -4.0f, 1.0f, 1.2f, 2.1f, false},  {8.6f, 4.0f, 1.0f, 1.2f, 2.1f, false},
+                {6.6f, 4.0f, 1.1f, 1.3f, 2.1f, false},   {1.0f, 4.0f, 0.8f, 1.0f, 2.0f, false},
+                {-0.8f, 4.0f, 1.0f, 1.1f, 2.1f, false},  {-3.9f, 4.0f, 1.0f, 1.2f, 2.0f, false},
+                {-6.5f, 4.0f, 1.2f, 1.2f, 2.0f, false},  {-8.6f, 4.0f, 0.8f, 1.3f, 2.1f, false},
+                {-10.0f, -0.9f, 1.0f, 1.1f, 2.0f, true}, {-10.0f, -2.5f, 1.1f, 1.3f, 2.1f, true},
+                {-10.0f, 0.7f, 0.7f, 1.2f, 2.0f, true},  {-10.0f, 3.6f, 0.6f, 1.1f, 2.0f, true},
+                {10.0f, 0.9f, 0.9f, 1.1f, 2.0f, true},   {10.0f, 2.9f, 1.2f, 1.3f, 2.1f, true},
+                {10.0f, -0.6f, 0.7f, 1.0f, 2.0f, true},  {10.0f, -3.6f, 0.6f, 1.2f, 2.1f, true}};
+  const Vec3 grounds[5] = {{190, 180, 150}, {60, 90, 140}, {170, 90, 70}, {90, 140, 100}, {120, 60, 90}};
+  uint32_t variant = 30;
+  for (const auto& p : prints) {
+    const float out = kWallHalfM + 0.012f, half = 0.5f * p.width;
+    const Vec3 reach = p.across ? Vec3{out, half, 0} : Vec3{half, out, 0};
+    add(world,
+        make_block({p.x - reach.x, p.y - reach.y, p.low}, {p.x + reach.x, p.y + reach.y, p.high},
+                   print(grounds[variant % 5], 0.09f + 0.01f * static_cast<float>(variant % 6), variant)));
+    ++variant;
+  }
+}
+
+/// Its middle at (x, y), two things on it.
+void table(World& world, float x, float y, uint32_t variant) {
+  const float top = 0.72f;
+  add(world, make_block({x - 0.45f, y - 0.35f, top - 0.04f}, {x + 0.45f, y + 0.35f, top}, wood(variant)));
+  for (const float dx : {-0.38f, 0.38f})
+    for (const float dy : {-0.28f, 0.28f})
+      add(world,
+          make_capsule({x + dx, y + dy, 0.0f}, {x + dx, y + dy, top - 0.05f}, 0.03f, wood(variant + 1)));
+  add(world, make_box({x - 0.18f, y, top + 0.09f}, {0.14f, 0.10f, 0.09f},
+                      print({150, 110, 60}, 0.05f, variant), 0.3f));
+  add(world, make_ellipsoid({x + 0.2f, y + 0.08f, top + 0.12f}, {0.09f, 0.09f, 0.12f},
+                            {Pattern::stripes, {40, 80, 150}, {220, 225, 235}, 0.06f, variant}));
+}
+
 }  // namespace
 
 void furnished_room(World& world) {
@@ -198,6 +307,52 @@ void bare_room(World& world) {
                       {Pattern::paint, {120, 140, 104}, {106, 124, 92}, 0.4f, 5}, 0.1f));
   add(world, make_box({0.50f, -1.66f, 0.55f}, {0.30f, 0.24f, 0.55f},
                       {Pattern::paint, {168, 150, 96}, {150, 134, 86}, 0.4f, 6}, 0.3f));
+}
+
+void suite_of_rooms(World& world) {
+  world.room = {{Pattern::planks, {112, 80, 52}, {190, 150, 106}, 0.14f, 0},
+                {Pattern::cloud, {226, 226, 222}, {196, 198, 202}, 0.35f, 4}};
+  add(world, {Kind::room, false, kSuiteHalfM, {Mat3{}, {0, 0, kSuiteHalfM.z}}, wallpaper(0)});
+  inner_walls(world);
+  suite_prints(world);
+  // What stands against the walls, the south row from the west, then the north row from the east.
+  put(world, desk, -7.5f, -1.5f, 2);
+  put(world, bookshelf, -7.0f, -1.5f, 3);
+  put(world, sofa_and_window, -2.5f, -2.0f, 2);
+  put(world, bookshelf, -2.57f, -2.0f, 0);
+  put(world, cabinet_and_radiator, -2.5f, -2.07f, 2);
+  put(world, desk, 2.3f, -1.5f, 3);
+  put(world, west_side, 2.5f, -2.57f, 3);
+  put(world, sofa_and_window, 8.0f, -2.2f, 3);
+  put(world, bookshelf, 8.3f, -1.5f, 3);
+  put(world, desk, 7.5f, 2.0f, 0);
+  put(world, cabinet_and_radiator, 7.5f, 2.0f, 2);
+  put(world, sofa_and_window, 2.8f, 2.0f, 0);
+  put(world, bookshelf, 3.4f, 2.57f, 3);
+  put(world, desk, -1.2f, 1.5f, 1);
+  put(world, west_side, -2.5f, 2.57f, 1);
+  put(world, bookshelf, -2.43f, 2.0f, 2);
+  put(world, sofa_and_window, -8.0f, 2.2f, 1);
+  put(world, cabinet_and_radiator, -7.5f, 2.0f, 2);
+  table(world, -7.2f, -1.6f, 40);
+  table(world, 7.2f, -1.7f, 42);
+  table(world, 7.0f, 1.7f, 44);
+  table(world, -7.2f, 1.8f, 46);
+  plant(world, 0.55f, -3.45f, 1);
+  plant(world, 5.6f, -0.55f, 2);
+  plant(world, 9.45f, 0.60f, 3);
+  plant(world, 4.45f, 3.45f, 4);
+  plant(world, 0.55f, 0.55f, 5);
+  plant(world, -5.6f, 0.55f, 6);
+  plant(world, -5.6f, -3.45f, 7);
+  uint32_t variant = 5;
+  for (const float y : {-2.0f, 2.0f})
+    for (const float x : {-7.5f, -2.5f, 2.5f, 7.5f}) {
+      add(world, make_block({x - 1.1f, y - 0.8f, 0.0f}, {x + 1.1f, y + 0.8f, 0.008f},
+                            {Pattern::checks, {130, 50, 46}, {196, 160, 110}, 0.3f, variant++}));
+      add(world, make_ellipsoid({x, y, 2.46f}, {0.22f, 0.22f, 0.12f},
+                                {Pattern::plain, {250, 246, 226}, {}, 0.1f, 0}));
+    }
 }
 
 }  // namespace stillmap::synthetic

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 
 #include "drivers/synthetic/motion.hpp"
 
@@ -63,6 +64,49 @@ Se3d fast_camera(double t) {
   const double swing = 50.0 * rise(1.5, 2.3, t) - 100.0 * rise(2.9, 3.9, t) + 100.0 * rise(4.9, 5.85, t) -
                        50.0 * rise(6.6, 7.3, t) + 45.0 * rise(7.9, 8.6, t) - 45.0 * rise(9.0, 9.7, t);
   return handheld(sway_place(sway, t), sway_yaw(sway, t) + kDegree * swing, sway_pitch(sway, t), t);
+}
+
+// ---- long_loop
+
+constexpr double kRound_s = 54.0;  // of walking, then the camera stands where it began
+
+/// Once round the suite, against the clock, through its eight doors.
+constexpr Spot2 kRound[] = {
+    {-2.6, -2.00}, {-1.3, -1.65}, {0.0, -1.45}, {1.3, -1.70}, {2.6, -2.10},  {3.8, -2.35},
+    {5.0, -2.40},  {6.3, -2.65},  {7.6, -2.85}, {8.5, -2.30}, {8.4, -1.15},  {7.6, 0.00},
+    {7.9, 1.10},   {8.3, 2.00},   {7.6, 2.75},  {6.3, 2.45},  {5.0, 1.50},   {3.8, 1.60},
+    {2.6, 2.00},   {1.3, 2.40},   {0.0, 2.50},  {-1.3, 2.40}, {-2.6, 2.05},  {-3.8, 1.75},
+    {-5.0, 1.70},  {-6.2, 2.40},  {-7.4, 2.75}, {-8.3, 2.10}, {-8.2, 1.00},  {-7.4, 0.00},
+    {-8.1, -1.1},  {-8.2, -2.1},  {-7.4, -2.8}, {-6.2, -2.5}, {-5.0, -1.60}, {-3.8, -1.80}};
+
+/// Every point with its time at an even pace; some of the next round follow, for whoever looks ahead, and
+/// some of the last one precede, for the direction at the start.
+std::vector<Waypoint> evenly_paced_round() {
+  constexpr int kPoints = static_cast<int>(std::size(kRound)), kMore = 4;
+  const auto point = [](int i) { return kRound[(i + kPoints) % kPoints]; };
+  const auto step_m = [&](int i) {
+    const Spot2 step = point(i + 1) - point(i);
+    return std::hypot(step.x, step.y);
+  };
+  double round_m = 0;
+  for (int i = 0; i < kPoints; ++i) round_m += step_m(i);
+  double t = 0;
+  for (int i = -kMore; i < 0; ++i) t -= step_m(i) * kRound_s / round_m;
+  std::vector<Waypoint> way;
+  for (int i = -kMore; i <= kPoints + kMore; ++i) {
+    way.push_back({t, point(i)});
+    t += step_m(i) * kRound_s / round_m;
+  }
+  return way;
+}
+
+Se3d long_loop_camera(double t) {
+  static const std::vector<Waypoint> way = evenly_paced_round();
+  const double walked_s = from_rest(t, 1.5) - from_rest(std::max(0.0, t - kRound_s), 1.5);
+  const Spot2 place = along(way, walked_s), ahead = along(way, walked_s + 1.6) - place;
+  const double yaw = std::atan2(ahead.y, ahead.x) + 20.0 * kDegree * wave(walked_s, kRound_s / 8.0);
+  return handheld({place.x, place.y, 1.36 + 0.05 * wave(walked_s, kRound_s / 11.0)}, yaw,
+                  kDegree * (-6.0 + 4.0 * wave(walked_s, kRound_s / 9.0)), t);
 }
 
 // ---- balloon
@@ -523,7 +567,8 @@ const std::vector<Scene>& all_scenes() {
       {"loop", 20, false, furnished_room, no_movers, loop_camera},
       {"fast", 10, false, furnished_room, no_movers, fast_camera},
       {"covered", 16, false, furnished_room, no_movers, looking_about_camera, hand_on_lens},
-      {"camera_kidnapped", 14, false, furnished_room, no_movers, kidnapped_camera, carried_off}};
+      {"camera_kidnapped", 14, false, furnished_room, no_movers, kidnapped_camera, carried_off},
+      {"long_loop", 57, false, suite_of_rooms, no_movers, long_loop_camera}};
   return scenes;
 }
 

@@ -72,15 +72,31 @@ void sample_shape(const Shape& shape, float step_m, const Put& put) {
   }
 }
 
-bool hidden(const World& world, size_t own, Vec3 p_world) {
+/// Radius of a sphere about the middle of a solid that holds all of it.
+float reach_m(const Shape& shape) {
+  const Vec3 h = shape.half_m;
+  return (shape.kind == Kind::capsule ? h.x + h.z : norm(h)) + kHiddenM;
+}
+
+/// What can hide a part of the shape number `own`.
+std::vector<const Shape*> near_to(const World& world, size_t own) {
+  const Shape& shape = world.shapes[own];
+  std::vector<const Shape*> near;
   for (size_t i = 0; i < world.shapes.size(); ++i) {
     const Shape& other = world.shapes[i];
     if (i == own || other.moving) continue;
-    const Vec3 from_centre = p_world - other.T_world_local.translation;
-    const Vec3 h = other.half_m;
-    const float reach = (other.kind == Kind::capsule ? h.x + h.z : norm(h)) + kHiddenM;
-    if (other.kind != Kind::room && dot(from_centre, from_centre) > reach * reach) continue;
-    if (distance_m(other, p_world) < kHiddenM) return true;
+    const float apart_m = norm(shape.T_world_local.translation - other.T_world_local.translation);
+    if (apart_m < reach_m(shape) + reach_m(other)) near.push_back(&other);
+  }
+  return near;
+}
+
+bool hidden(const std::vector<const Shape*>& others, Vec3 p_world) {
+  for (const Shape* other : others) {
+    const Vec3 from_centre = p_world - other->T_world_local.translation;
+    const float reach = reach_m(*other);
+    if (other->kind != Kind::room && dot(from_centre, from_centre) > reach * reach) continue;
+    if (distance_m(*other, p_world) < kHiddenM) return true;
   }
   return false;
 }
@@ -92,9 +108,10 @@ std::vector<Vec3> sample_still_surface(const World& world, float step_m) {
   for (size_t i = 0; i < world.shapes.size(); ++i) {
     const Shape& shape = world.shapes[i];
     if (shape.moving) continue;
+    const std::vector<const Shape*> others = near_to(world, i);
     sample_shape(shape, step_m, [&](Vec3 p_local) {
       const Vec3 p = shape.T_world_local * p_local;
-      if (!hidden(world, i, p)) points.push_back(p);
+      if (!hidden(others, p)) points.push_back(p);
     });
   }
   return points;

@@ -89,7 +89,7 @@ TEST_P(EveryScene, camera_is_brisk_but_smooth) {
 TEST_P(EveryScene, movers_cover_15_percent_and_leave_enough_still) {
   const Scene& scene = scene_named(GetParam());
   const bool obstructs = std::string(scene.name).find("obstructing") != std::string::npos;
-  const std::vector<Shares> shares = shares_over(scene, 0.25);
+  const std::vector<Shares> shares = shares_over(scene, scene.default_seconds / 48.0);
   double moving = 0, least_still = 1;
   for (const Shares& s : shares) {
     moving += s.moving / static_cast<double>(shares.size());
@@ -197,6 +197,22 @@ TEST(Scenes, loop_comes_back_to_its_start) {
   for (double t = 0; t < 19.0; t += kFrame_s)
     seen_yaw += degrees_between(scene.camera(t), scene.camera(t + kFrame_s));
   EXPECT_GT(seen_yaw, 330.0);
+}
+
+TEST(Scenes, long_loop_walks_40_metres_and_sees_its_start_again) {
+  const Scene& scene = scene_named("long_loop");
+  double path_m = 0, farthest_m = 0;
+  for (double t = 0; t < scene.default_seconds; t += kFrame_s) {
+    const Vec3d here = scene.camera(t).translation;
+    path_m += norm(scene.camera(t + kFrame_s).translation - here);
+    farthest_m = std::max(farthest_m, norm(here - scene.camera(0).translation));
+  }
+  EXPECT_GT(path_m, 40.0);
+  EXPECT_LT(path_m, 1.0 * scene.default_seconds);  // a walk, not a run
+  EXPECT_GT(farthest_m, 10.0);                     // the start is out of sight and out of range
+  const Se3d start = scene.camera(0), end = scene.camera(scene.default_seconds);
+  EXPECT_LT(norm(end.translation - start.translation), 0.03);
+  EXPECT_LT(degrees_between(start, end), 3.0);
 }
 
 TEST(Scenes, obstructing_box_fills_80_percent_for_two_seconds) {
