@@ -94,8 +94,7 @@ Subject recording_subject(std::string source, const BenchOptions& o) {
   fs::path dir = source.substr(std::min(source.find(':') + 1, source.size()));
   if (!dir.has_filename()) dir = dir.parent_path();
   s.scene = dir.filename().string();
-  if (s.skip_frames > 0 || s.max_frames > 0)
-    s.scene += fmt::format("@{}+{}", s.skip_frames, s.max_frames);
+  if (s.skip_frames > 0 || s.max_frames > 0) s.scene += fmt::format("@{}+{}", s.skip_frames, s.max_frames);
   std::error_code ignored;
   if (fs::is_regular_file(dir / "groundtruth.txt", ignored)) s.truth = (dir / "groundtruth.txt").string();
   return s;
