@@ -63,7 +63,7 @@ struct TrackParams {
   float converged_m = 1e-4f;
   float converged_rad = 1e-4f;
   MotionPrior prior = MotionPrior::constant_velocity;
-  float prior_point_m = 0.05f;
+  float prior_point_m = 0.03f;
   float prior_gain = 0.5f;
   float prior_fade_s = 0.3f;
   float prior_forget = 0.1f;
