@@ -194,11 +194,11 @@ class Sources(Case):
         whole = read_trajectory(self.out / "trajectory.txt")
         self.assertEqual(len(whole), 30)
         # The folder and the scene itself are the same frames; only the stamps are rounded, and with them where
-        # the registration of a frame starts.
+        # the registration of a frame starts: they agree within a millimetre.
         self.mapped("--source", SMALL, "--out", self.folder / "direct")
         for one, other in zip(whole, read_trajectory(self.folder / "direct/trajectory.txt"), strict=True):
             for a, b in zip(one, other, strict=True):
-                self.assertAlmostEqual(a, b, delta=2e-4)
+                self.assertAlmostEqual(a, b, delta=1e-3)
 
         depth[10].write_bytes(depth[10].read_bytes()[:200])
         depth[15].unlink()
