@@ -5,17 +5,9 @@
 
 #include <cstdint>
 
-namespace stillmap::synthetic {
+#include "kernels/base/mix_bits.hpp"
 
-/// Well-mixed bits of `x`; a bijection.
-inline uint32_t mix_bits(uint32_t x) {
-  x ^= x >> 16;
-  x *= 0x7feb352du;
-  x ^= x >> 15;
-  x *= 0x846ca68bu;
-  x ^= x >> 16;
-  return x;
-}
+namespace stillmap::synthetic {
 
 /// Key of one random field of one frame.
 inline uint32_t field_key(uint64_t seed, uint32_t frame, uint32_t field) {

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 
+#include "kernels/base/mix_bits.hpp"
 #include "kernels/relocalise/small_view.hpp"
 
 namespace stillmap {
@@ -17,16 +18,6 @@ constexpr float kFernFarthest_m = 4.0f;
 constexpr float kFernDarkest = 0.5f;  ///< the luminance tests, over the mean of the view
 constexpr float kFernBrightest = 1.5f;
 
-/// Well-mixed bits of `x`; a bijection.
-STILLMAP_HD uint32_t fern_bits(uint32_t x) {
-  x ^= x >> 16;
-  x *= 0x7feb352du;
-  x ^= x >> 15;
-  x *= 0x846ca68bu;
-  x ^= x >> 16;
-  return x;
-}
-
 /// Where a fern looks and what it compares with; the same for everyone, drawn once and for all by a hash.
 struct Fern {
   int32_t row = 0, col = 0;
@@ -35,7 +26,7 @@ struct Fern {
 };
 STILLMAP_HD Fern fern_of(uint32_t index, int32_t rows, int32_t cols) {
   const auto unit = [&](uint32_t draw) {
-    return static_cast<float>(fern_bits(index * 8 + draw + 1) >> 8) * (1.0f / 16777216.0f);
+    return static_cast<float>(mix_bits(index * 8 + draw + 1) >> 8) * (1.0f / 16777216.0f);
   };
   Fern fern;
   fern.row = static_cast<int32_t>(unit(0) * static_cast<float>(rows));
