@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <string>
@@ -20,33 +19,22 @@
 namespace stillmap {
 namespace {
 
-struct Column {
-  const char* head;
-  double AccuracyFigures::*figure;
-  double scale;
-  int decimals;
-};
-
-constexpr Column kColumns[] = {{"ATE cm", &AccuracyFigures::ate_rmse_m, 100, 2},
-                               {"IoU %", &AccuracyFigures::mask_iou, 100, 1},
-                               {"false %", &AccuracyFigures::static_masked, 100, 2},
-                               {"undecl", &AccuracyFigures::undeclared_loss, 1, 0},
-                               {"declrd", &AccuracyFigures::declared_loss, 1, 0},
-                               {"lost", &AccuracyFigures::lost_frames, 1, 0},
-                               {"< 2 cm %", &AccuracyFigures::within_2cm, 100, 1},
-                               {"ghosts %", &AccuracyFigures::ghosts, 100, 2},
-                               {"there %", &AccuracyFigures::completeness, 100, 1},
-                               {"masked %", &AccuracyFigures::masked_fraction_mean, 100, 1},
-                               {"ms p50", &AccuracyFigures::total_ms_p50, 1, 1}};
+constexpr FigureColumn kColumns[] = {{"ATE cm", &AccuracyFigures::ate_rmse_m, 100, 2},
+                                     {"IoU %", &AccuracyFigures::mask_iou, 100, 1},
+                                     {"false %", &AccuracyFigures::static_masked, 100, 2},
+                                     {"undecl", &AccuracyFigures::undeclared_loss, 1, 0},
+                                     {"declrd", &AccuracyFigures::declared_loss, 1, 0},
+                                     {"lost", &AccuracyFigures::lost_frames, 1, 0},
+                                     {"< 2 cm %", &AccuracyFigures::within_2cm, 100, 1},
+                                     {"ghosts %", &AccuracyFigures::ghosts, 100, 2},
+                                     {"there %", &AccuracyFigures::completeness, 100, 1},
+                                     {"masked %", &AccuracyFigures::masked_fraction_mean, 100, 1},
+                                     {"ms p50", &AccuracyFigures::total_ms_p50, 1, 1}};
 
 void print_head() {
   fmt::print("{:<34} {:<10} {:>4}", "scene", "preset", "seed");
-  for (const Column& c : kColumns) fmt::print(" {:>8}", c.head);
+  for (const FigureColumn& c : kColumns) fmt::print(" {:>8}", c.head);
   fmt::print(" {:>7} {:>7}\n", "chi2 %", "good %");
-}
-
-std::string number(double value, int decimals) {
-  return std::isnan(value) ? std::string("-") : fmt::format("{:.{}f}", value, decimals);
 }
 
 void print_row(const AccuracyRun& run) {
@@ -55,9 +43,9 @@ void print_row(const AccuracyRun& run) {
   if (!run.error.empty()) {
     fmt::print(" {}\n", run.error);
   } else {
-    for (const Column& c : kColumns) fmt::print(" {:>8}", number(c.scale * (f.*c.figure), c.decimals));
-    fmt::print(" {:>7} {:>7}\n", number(100 * f.chi2_inside / f.chi2_frames, 1),
-               number(100 * f.in_view_good / f.in_view, 1));
+    for (const FigureColumn& c : kColumns) fmt::print(" {:>8}", c.text(f));
+    fmt::print(" {:>7} {:>7}\n", figure_text(100 * f.chi2_inside / f.chi2_frames, 1),
+               figure_text(100 * f.in_view_good / f.in_view, 1));
   }
   std::fflush(stdout);
 }
@@ -78,7 +66,7 @@ void print_bars(const std::vector<AccuracyRun>& runs) {
     for (const Bar& bar : judge(runs, preset, yardstick_for(runs, preset)))
       if (bar.verdict != Verdict::unknown)
         fmt::print("  {:<12} {}: {} {} ({}; limit {})\n", to_string(bar.verdict), bar.what,
-                   number(bar.value, 2), bar.unit, bar.scene, number(bar.limit, 2));
+                   figure_text(bar.value, 2), bar.unit, bar.scene, figure_text(bar.limit, 2));
   }
 }
 

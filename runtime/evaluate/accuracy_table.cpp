@@ -10,17 +10,10 @@
 namespace stillmap {
 namespace {
 
-struct Column {
-  const char* head;
-  double AccuracyFigures::*figure;
-  double scale;
-  int decimals;
-};
-
 /// Each of the tables: few columns, so that two presets fit side by side.
 struct Part {
   const char* title;
-  std::vector<Column> columns;
+  std::vector<FigureColumn> columns;
 };
 
 const std::vector<Part>& parts() {
@@ -40,14 +33,10 @@ const std::vector<Part>& parts() {
   return all;
 }
 
-std::string number(double value, int decimals) {
-  return std::isnan(value) ? std::string("-") : fmt::format("{:.{}f}", value, decimals);
-}
-
-std::string cell(const AccuracySummary& s, const Column& c) {
-  const std::string median = number(c.scale * (s.median.*c.figure), c.decimals);
+std::string cell(const AccuracySummary& s, const FigureColumn& c) {
+  const std::string median = c.text(s.median);
   if (s.runs < 2 || std::isnan(s.median.*c.figure)) return median;
-  return fmt::format("{} ({})", median, number(c.scale * (s.worst.*c.figure), c.decimals));
+  return fmt::format("{} ({})", median, c.text(s.worst));
 }
 
 const AccuracySummary* find(const std::vector<AccuracySummary>& all, const std::string& scene,
@@ -68,7 +57,7 @@ std::string table(const Part& part, const std::vector<AccuracyRun>& runs,
                   const std::vector<AccuracySummary>& summaries) {
   const std::vector<std::string> presets = presets_of(runs);
   std::string text = fmt::format("### {}\n\n| scene |", part.title), rule = "|---|";
-  for (const Column& c : part.columns)
+  for (const FigureColumn& c : part.columns)
     for (const std::string& preset : presets) {
       text += fmt::format(" {} {} |", c.head, preset);
       rule += "---|";
@@ -76,7 +65,7 @@ std::string table(const Part& part, const std::vector<AccuracyRun>& runs,
   text += "\n" + rule + "\n";
   for (const std::string& scene : scenes_of(runs)) {
     text += fmt::format("| `{}` |", scene);
-    for (const Column& c : part.columns)
+    for (const FigureColumn& c : part.columns)
       for (const std::string& preset : presets) {
         const AccuracySummary* s = find(summaries, scene, preset);
         text += fmt::format(" {} |", !s ? "-" : s->failed == s->runs ? "failed" : cell(*s, c));
@@ -128,14 +117,18 @@ std::string bars(const std::vector<AccuracyRun>& runs, const std::string& preset
       continue;
     }
     const int decimals = bar.unit == "frames" ? 0 : 2;
-    text +=
-        fmt::format("| {} | {} | {} {} | {} {} | {} |\n", bar.what, bar.scene, number(bar.value, decimals),
-                    bar.unit, number(bar.limit, decimals), bar.unit, to_string(bar.verdict));
+    text += fmt::format("| {} | {} | {} {} | {} {} | {} |\n", bar.what, bar.scene,
+                        figure_text(bar.value, decimals), bar.unit, figure_text(bar.limit, decimals),
+                        bar.unit, to_string(bar.verdict));
   }
   return text + "\n";
 }
 
 }  // namespace
+
+std::string figure_text(double value, int decimals) {
+  return std::isnan(value) ? std::string("-") : fmt::format("{:.{}f}", value, decimals);
+}
 
 std::vector<std::string> presets_of(const std::vector<AccuracyRun>& runs) {
   std::vector<std::string> presets;

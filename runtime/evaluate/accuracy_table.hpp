@@ -7,6 +7,22 @@
 
 namespace stillmap {
 
+/// @param value NaN: not known
+/// @return with so many digits behind the point, "-" for what is not known
+std::string figure_text(double value, int decimals);
+
+/// How a table shows one figure.
+struct FigureColumn {
+  const char* head;  ///< with its unit
+  double AccuracyFigures::*figure;
+  double scale;  ///< to the unit of the head
+  int decimals;
+
+  std::string text(const AccuracyFigures& figures) const {
+    return figure_text(scale * (figures.*figure), decimals);
+  }
+};
+
 /// Presets in the order in which they first appear.
 std::vector<std::string> presets_of(const std::vector<AccuracyRun>& runs);
 
