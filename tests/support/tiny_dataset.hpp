@@ -8,7 +8,6 @@
 #include <string>
 
 #include "runtime/image/image_file.hpp"
-#include "runtime/ports/frame_source.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/support/test_image.hpp"
 
@@ -47,21 +46,5 @@ inline void write_sevenscenes_frame(const TempDir& dir, int number) {
   write_depth(dir / sevenscenes_name(number, "depth.png"), static_cast<uint32_t>(number));
   write_colour(dir / sevenscenes_name(number, "color.png"), static_cast<uint32_t>(number));
 }
-
-/// Memory for the frames of a source.
-class FrameBuffer {
- public:
-  explicit FrameBuffer(const SourceInfo& info)
-      : depth_(info.camera.k.height, info.camera.k.width),
-        colour_(info.camera.k.height, info.camera.k.width) {
-    frame.depth_raw = depth_.view();
-    frame.colour = colour_.view();
-  }
-  RgbdFrame frame;
-
- private:
-  TestImage<uint16_t> depth_;
-  TestImage<Rgb8> colour_;
-};
 
 }  // namespace stillmap::test

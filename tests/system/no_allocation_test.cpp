@@ -8,13 +8,15 @@
 #include <cerrno>
 #include <cstdlib>
 #include <memory>
+#include <optional>
+#include <string>
 #include <thread>
-#include <vector>
 
 #include "config/engine_params.hpp"
 #include "drivers/registry.hpp"
 #include "runtime/core/heap_guard.hpp"
 #include "runtime/pipeline/pipeline.hpp"
+#include "tests/support/frame_memory.hpp"
 
 extern "C" {
 void* __libc_malloc(size_t);
@@ -81,60 +83,59 @@ TEST(HeapGuard, SeesEveryWayToAllocateInEveryThread) {
   EXPECT_EQ(allocations_of([] {}), 0u);
 }
 
-TEST(Pipeline, DoesNotAllocateIn300FramesWorkersIncluded) {
+/// A pipeline and the frames of a source for it.
+class RealTimeLoop : public testing::Test {
+ protected:
+  void start(const Config& config, const std::string& scene) {
+    auto opened = open_source(scene, SourceOptions{});
+    ASSERT_TRUE(opened) << opened.error();
+    source_ = std::move(*opened);
+    const SourceInfo& info = source_->info();
+    engine_ = make_cpu_engine(engine_params(config, info.camera, info.depth_units_per_m));
+    ASSERT_NE(engine_, nullptr);
+    memory_.emplace(info);
+    pipeline_.emplace(*engine_, config);
+  }
+  void next() { ASSERT_EQ(source_->next(memory_->frame, 1000), Status::ok) << source_->error(); }
+  void process() {
+    allocations_ += allocations_of([&] { pipeline_->process(memory_->frame); });
+  }
+
+  std::unique_ptr<FrameSource> source_;
+  std::unique_ptr<Engine> engine_;
+  std::optional<test::FrameMemory> memory_;
+  std::optional<Pipeline> pipeline_;
+  uint64_t allocations_ = 0;
+};
+
+TEST_F(RealTimeLoop, DoesNotAllocateIn300FramesWorkersIncluded) {
   Config config;
   config.map.pool_blocks = 20000;
   config.map.voxel_m = 0.04f;  // a coarse map: what is looked for does not depend on it
   config.map.truncation_m = 0.16f;
-  auto source = open_source("synthetic:crowd,size=160x120,seconds=11", SourceOptions{});
-  ASSERT_TRUE(source) << source.error();
-  const SourceInfo& info = (*source)->info();
-  const std::unique_ptr<Engine> engine =
-      make_cpu_engine(engine_params(config, info.camera, info.depth_units_per_m));
-  ASSERT_NE(engine, nullptr);
-  std::vector<uint16_t> depth(160 * 120);
-  std::vector<Rgb8> colour(160 * 120);
-  std::vector<uint8_t> mask(160 * 120);
-  RgbdFrame frame;
-  frame.depth_raw = {depth.data(), 120, 160, 160};
-  frame.colour = {colour.data(), 120, 160, 160};
-  frame.truth_mask = {mask.data(), 120, 160, 160};
-  Pipeline pipeline(*engine, config);
-  uint64_t allocations = 0;
+  ASSERT_NO_FATAL_FAILURE(start(config, "synthetic:crowd,size=160x120,seconds=11"));
   for (int i = 0; i < 300; ++i) {
-    ASSERT_EQ((*source)->next(frame, 1000), Status::ok) << (*source)->error();
-    allocations += allocations_of([&] { pipeline.process(frame); });
+    ASSERT_NO_FATAL_FAILURE(next());
+    process();
   }
-  EXPECT_EQ(allocations, 0u);
-  EXPECT_EQ(pipeline.counters().frames, 300u);
-  EXPECT_GT(engine->map_health().blocks, 100u);  // it did map
+  EXPECT_EQ(allocations_, 0u);
+  EXPECT_EQ(pipeline_->counters().frames, 300u);
+  EXPECT_GT(engine_->map_health().blocks, 100u);  // it did map
 }
 
-TEST(Pipeline, DoesNotAllocateWhileLostAndFindingItselfAgain) {
+TEST_F(RealTimeLoop, DoesNotAllocateWhileLostAndFindingItselfAgain) {
   Config config;
   config.map.pool_blocks = 20000;
   config.map.voxel_m = 0.02f;
-  auto source = open_source("synthetic:static,size=160x120,seconds=3", SourceOptions{});
-  ASSERT_TRUE(source) << source.error();
-  const SourceInfo& info = (*source)->info();
-  const std::unique_ptr<Engine> engine =
-      make_cpu_engine(engine_params(config, info.camera, info.depth_units_per_m));
-  ASSERT_NE(engine, nullptr);
-  std::vector<uint16_t> depth(160 * 120);
-  std::vector<Rgb8> colour(160 * 120);
-  RgbdFrame frame;
-  frame.depth_raw = {depth.data(), 120, 160, 160};
-  frame.colour = {colour.data(), 120, 160, 160};
-  Pipeline pipeline(*engine, config);
-  uint64_t allocations = 0;
+  ASSERT_NO_FATAL_FAILURE(start(config, "synthetic:static,size=160x120,seconds=3"));
   for (int i = 0; i < 80; ++i) {
-    ASSERT_EQ((*source)->next(frame, 1000), Status::ok) << (*source)->error();
-    if (i >= 50 && i < 60) std::fill(depth.begin(), depth.end(), uint16_t{0});
-    allocations += allocations_of([&] { pipeline.process(frame); });
+    ASSERT_NO_FATAL_FAILURE(next());
+    if (i >= 50 && i < 60) std::fill(memory_->depth.begin(), memory_->depth.end(), uint16_t{0});
+    process();
   }
-  EXPECT_EQ(allocations, 0u);
-  EXPECT_GE(pipeline.counters().lost_frames, 3u);
-  EXPECT_EQ(pipeline.counters().relocalised, 1u);
+  EXPECT_EQ(allocations_, 0u);
+  EXPECT_GE(pipeline_->counters().lost_frames, 3u);
+  EXPECT_EQ(pipeline_->counters().relocalised, 1u);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/frame_memory.hpp"
 #include "tests/support/tiny_dataset.hpp"
 
 namespace stillmap {
@@ -29,7 +30,7 @@ TEST(Registry, OpensRecordings) {
     const Result<std::unique_ptr<FrameSource>> source = open_source(scheme + dir.path(), options);
     ASSERT_TRUE(source) << source.error();
     EXPECT_EQ((*source)->info().name, scheme + dir.path());
-    test::FrameBuffer buffer((*source)->info());
+    test::FrameMemory buffer((*source)->info());
     EXPECT_EQ((*source)->next(buffer.frame, 0), Status::ok) << (*source)->error();
   }
 }

@@ -7,7 +7,7 @@
 
 #include "drivers/dataset/sevenscenes_source.hpp"
 #include "drivers/dataset/tum_source.hpp"
-#include "tests/support/tiny_dataset.hpp"
+#include "tests/support/frame_memory.hpp"
 
 namespace stillmap {
 namespace {
@@ -29,7 +29,7 @@ double valid_share(ImageView<const uint16_t> depth) {
 }
 
 void expect_good_frames(FrameSource& source, int count) {
-  test::FrameBuffer buffer(source.info());
+  test::FrameMemory buffer(source.info());
   Stamp last{-1};
   for (int i = 0; i < count; ++i) {
     ASSERT_EQ(source.next(buffer.frame, 0), Status::ok) << source.error();

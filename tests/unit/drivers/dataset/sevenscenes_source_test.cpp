@@ -5,12 +5,13 @@
 #include <filesystem>
 #include <random>
 
+#include "tests/support/frame_memory.hpp"
 #include "tests/support/tiny_dataset.hpp"
 
 namespace stillmap {
 namespace {
 
-using test::FrameBuffer;
+using test::FrameMemory;
 using test::sevenscenes_name;
 using test::TempDir;
 
@@ -45,7 +46,7 @@ TEST(SevenScenes, NumbersMayStartAnywhereAndHaveGaps) {
   EXPECT_EQ(source->info().name, "sevenscenes:" + dir.path());
   EXPECT_EQ(source->info().depth_units_per_m, 1000.0f);
   EXPECT_EQ(source->info().frames, 3);
-  FrameBuffer buffer(source->info());
+  FrameMemory buffer(source->info());
   for (const int number : {10, 12, 30}) {
     ASSERT_EQ(source->next(buffer.frame, 0), Status::ok) << source->error();
     EXPECT_EQ(buffer.frame.depth_stamp, sevenscenes_stamp(number));
@@ -86,7 +87,7 @@ TEST(SevenScenes, PoseIsTruth) {
   test::write_text(dir / sevenscenes_name(2, "pose.txt"), "2 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
   const auto source = open(dir);
   ASSERT_TRUE(source);
-  FrameBuffer buffer(source->info());
+  FrameMemory buffer(source->info());
   ASSERT_EQ(source->next(buffer.frame, 0), Status::ok);
   ASSERT_TRUE(buffer.frame.truth_T_world_cam);
   const Vec3d p_world = *buffer.frame.truth_T_world_cam * Vec3d{1, 0, 0};
@@ -107,7 +108,7 @@ TEST(SevenScenes, IncompleteFramesArePassedOver) {
   const auto source = open(dir);
   ASSERT_TRUE(source);
   EXPECT_EQ(source->info().frames, 4);
-  FrameBuffer buffer(source->info());
+  FrameMemory buffer(source->info());
   EXPECT_EQ(source->next(buffer.frame, 0), Status::ok);
   EXPECT_EQ(source->next(buffer.frame, 0), Status::bad_data);
   EXPECT_TRUE(contains(source->error(), "frame-000001.color.png or .color.jpg: is missing"))
@@ -153,7 +154,7 @@ TEST(SevenScenes, MutatedPosesNeverCrash) {
     test::write_text(dir / sevenscenes_name(0, "pose.txt"), text);
     const auto source = open(dir);
     ASSERT_TRUE(source);
-    FrameBuffer buffer(source->info());
+    FrameMemory buffer(source->info());
     ASSERT_EQ(source->next(buffer.frame, 0), Status::ok);
     const auto& truth = buffer.frame.truth_T_world_cam;
     (truth ? poses : refused) += 1;

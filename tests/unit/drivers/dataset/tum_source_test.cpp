@@ -6,12 +6,13 @@
 #include <limits>
 #include <random>
 
+#include "tests/support/frame_memory.hpp"
 #include "tests/support/tiny_dataset.hpp"
 
 namespace stillmap {
 namespace {
 
-using test::FrameBuffer;
+using test::FrameMemory;
 using test::TempDir;
 
 bool contains(const std::string& text, const std::string& part) {
@@ -50,7 +51,7 @@ constexpr const char* kDepthFirst =
 /// All frames are there, with the pixels of image `i` in frame `i`.
 void expect_three_good_frames(FrameSource& source) {
   EXPECT_EQ(source.info().frames, 3);
-  FrameBuffer buffer(source.info());
+  FrameMemory buffer(source.info());
   for (uint32_t i = 0; i < 3; ++i) {
     ASSERT_EQ(source.next(buffer.frame, 0), Status::ok) << source.error();
     EXPECT_EQ(buffer.frame.sequence, i);
@@ -121,7 +122,7 @@ TEST_F(TumSource, AddsTheOffsetToColourBeforePairing) {
   options.time_offset_ms = -50;
   const auto source = open();
   ASSERT_TRUE(source);
-  FrameBuffer buffer(source->info());
+  FrameMemory buffer(source->info());
   ASSERT_EQ(source->next(buffer.frame, 0), Status::ok);
   EXPECT_EQ(buffer.frame.colour_stamp.ns, 1000000000);
 }
@@ -132,7 +133,7 @@ TEST_F(TumSource, AnOffsetPairsTheColumnsOfAssociatedAnew) {
   const auto source = open();
   ASSERT_TRUE(source);
   EXPECT_EQ(source->info().frames, 2);
-  FrameBuffer buffer(source->info());
+  FrameMemory buffer(source->info());
   ASSERT_EQ(source->next(buffer.frame, 0), Status::ok);
   EXPECT_EQ(buffer.frame.depth_stamp.ns, 1100000000);
   EXPECT_EQ(buffer.frame.colour_stamp.ns, 1100000000);
@@ -144,7 +145,7 @@ TEST_F(TumSource, StampsAreExact) {
   associate("1305031229.597000123 depth/0.png 1305031229.5970 rgb/0.png\n");
   const auto source = open();
   ASSERT_TRUE(source);
-  FrameBuffer buffer(source->info());
+  FrameMemory buffer(source->info());
   ASSERT_EQ(source->next(buffer.frame, 0), Status::ok);
   EXPECT_EQ(buffer.frame.depth_stamp.ns, 1305031229597000123);
   EXPECT_EQ(buffer.frame.colour_stamp.ns, 1305031229597000000);
@@ -158,7 +159,7 @@ TEST_F(TumSource, TruthIsTheNearestPoseWithinTwentyMs) {
       "1.1 nan 0 0 0 0 0 1\n1.179 0 0 0 0 0 0 1\nrubbish\n");
   const auto source = open();
   ASSERT_TRUE(source);
-  FrameBuffer buffer(source->info());
+  FrameMemory buffer(source->info());
   ASSERT_EQ(source->next(buffer.frame, 0), Status::ok);
   ASSERT_TRUE(buffer.frame.truth_T_world_cam);
   EXPECT_EQ(buffer.frame.truth_T_world_cam->translation.y, 2.0);
@@ -173,7 +174,7 @@ TEST_F(TumSource, SkipPassesOverFrames) {
   associate(kDepthFirst);
   const auto source = open();
   ASSERT_TRUE(source);
-  FrameBuffer buffer(source->info());
+  FrameMemory buffer(source->info());
   source->skip(2);
   ASSERT_EQ(source->next(buffer.frame, 0), Status::ok);
   EXPECT_EQ(buffer.frame.sequence, 2u);
@@ -186,7 +187,7 @@ TEST_F(TumSource, SkipPassesOverFrames) {
 
 /// Three frames of which only the one in the middle is bad.
 void expect_only_the_middle_bad(FrameSource& source, const std::string& message) {
-  FrameBuffer buffer(source.info());
+  FrameMemory buffer(source.info());
   EXPECT_EQ(source.next(buffer.frame, 0), Status::ok) << source.error();
   EXPECT_EQ(source.error(), "");
   EXPECT_EQ(source.next(buffer.frame, 0), Status::bad_data);
@@ -238,7 +239,7 @@ TEST_F(TumSource, OneStrayStampAheadDoesNotSpoilTheRest) {
       "1.3 depth/2.png 1.3 rgb/2.png\n");
   const auto source = open();
   ASSERT_TRUE(source);
-  FrameBuffer buffer(source->info());
+  FrameMemory buffer(source->info());
   EXPECT_EQ(source->next(buffer.frame, 0), Status::ok);
   EXPECT_EQ(source->next(buffer.frame, 0), Status::bad_data);
   EXPECT_TRUE(contains(source->error(), "99.000000 lies ahead")) << source->error();
@@ -288,7 +289,7 @@ TEST_F(TumSource, FirstDepthImageMayBeMissing) {
   std::filesystem::remove(dir / "depth/0.png");
   const auto source = open();
   ASSERT_TRUE(source);
-  FrameBuffer buffer(source->info());
+  FrameMemory buffer(source->info());
   EXPECT_EQ(source->next(buffer.frame, 0), Status::bad_data);
   EXPECT_EQ(source->next(buffer.frame, 0), Status::ok);
 }
@@ -347,7 +348,7 @@ TEST_F(TumSource, MutatedListsNeverCrash) {
       continue;
     }
     ++opened;
-    FrameBuffer buffer((*source)->info());
+    FrameMemory buffer((*source)->info());
     for (int i = 0; i < 50; ++i) {
       const Status status = (*source)->next(buffer.frame, 0);
       if (status == Status::end) break;

@@ -5,31 +5,17 @@
 #include <algorithm>
 #include <cstring>
 
+#include "tests/support/frame_memory.hpp"
+
 namespace stillmap {
 namespace {
 
-/// Memory of a frame, rows `padding` elements longer than the image.
-struct FrameMemory {
-  FrameMemory(int32_t cols, int32_t rows, int32_t padding = 0)
-      : depth(static_cast<size_t>((cols + padding) * rows), 0xabcd),
-        colour(depth.size()),
-        mask(depth.size(), 7) {
-    frame.depth_raw = {depth.data(), rows, cols, cols + padding};
-    frame.colour = {colour.data(), rows, cols, cols + padding};
-    frame.truth_mask = {mask.data(), rows, cols, cols + padding};
-  }
-  bool same_bytes(const FrameMemory& other) const {
-    return same_measurement(other) && mask == other.mask && frame.depth_stamp == other.frame.depth_stamp;
-  }
-  bool same_measurement(const FrameMemory& other) const {
-    return depth == other.depth && std::memcmp(colour.data(), other.colour.data(), 3 * colour.size()) == 0;
-  }
+using test::FrameMemory;
 
-  std::vector<uint16_t> depth;
-  std::vector<Rgb8> colour;
-  std::vector<uint8_t> mask;
-  RgbdFrame frame;
-};
+bool same_bytes(const FrameMemory& a, const FrameMemory& b) {
+  return a.depth == b.depth && std::memcmp(a.colour.data(), b.colour.data(), 3 * a.colour.size()) == 0 &&
+         a.mask == b.mask && a.frame.depth_stamp == b.frame.depth_stamp;
+}
 
 std::unique_ptr<FrameSource> opened(const std::string& spec, int threads = 1) {
   auto source = open_synthetic(spec, threads);
@@ -76,20 +62,14 @@ TEST(SyntheticSource, lists_the_nineteen_scenes) {
 }
 
 TEST(SyntheticSource, a_covered_lens_measures_nothing_and_sees_dark) {
-  const auto source = open_synthetic("covered,size=64x48");
-  ASSERT_TRUE(source) << source.error();
-  std::vector<uint16_t> depth(64 * 48);
-  std::vector<Rgb8> colour(64 * 48);
-  std::vector<uint8_t> mask(64 * 48);
-  RgbdFrame frame;
-  frame.depth_raw = {depth.data(), 48, 64, 64};
-  frame.colour = {colour.data(), 48, 64, 64};
-  frame.truth_mask = {mask.data(), 48, 64, 64};
+  const auto source = opened("covered,size=64x48");
+  FrameMemory memory(source->info());
   const auto covered = [&](uint32_t first, uint32_t count) {
-    (*source)->skip(first);
+    source->skip(first);
     uint32_t frames = 0;
     for (uint32_t i = 0; i < count; ++i) {
-      EXPECT_EQ((*source)->next(frame, 0), Status::ok);
+      EXPECT_EQ(source->next(memory.frame, 0), Status::ok);
+      const auto& [depth, colour, mask, frame] = memory;
       const bool blind = std::all_of(depth.begin(), depth.end(), [](uint16_t d) { return d == 0; });
       const bool dark =
           std::all_of(colour.begin(), colour.end(), [](Rgb8 c) { return c.r < 50 && c.g < 30; });
@@ -111,9 +91,9 @@ TEST(SyntheticSource, errors_of_the_spec_come_through) {
 TEST(SyntheticSource, same_seed_same_bytes_with_any_number_of_threads) {
   for (const char* scene : {"crowd", "synchronous"}) {
     const FrameMemory one = frame_of(scene, 130, 1);
-    EXPECT_TRUE(one.same_bytes(frame_of(scene, 130, 1)));
-    EXPECT_TRUE(one.same_bytes(frame_of(scene, 130, 3)));
-    EXPECT_TRUE(one.same_bytes(frame_of(std::string(scene) + ",seed=1", 130, 2)));
+    EXPECT_TRUE(same_bytes(one, frame_of(scene, 130, 1)));
+    EXPECT_TRUE(same_bytes(one, frame_of(scene, 130, 3)));
+    EXPECT_TRUE(same_bytes(one, frame_of(std::string(scene) + ",seed=1", 130, 2)));
   }
 }
 
@@ -137,7 +117,7 @@ TEST(SyntheticSource, skipped_frames_change_nothing_after_them) {
   quick->skip(5);
   ASSERT_EQ(quick->next(jumped.frame, 0), Status::ok);
   EXPECT_EQ(jumped.frame.sequence, 20u);
-  EXPECT_TRUE(walked.same_bytes(jumped));
+  EXPECT_TRUE(same_bytes(walked, jumped));
 }
 
 TEST(SyntheticSource, thirty_frames_a_second_then_the_end) {
@@ -198,8 +178,8 @@ TEST(SyntheticSource, respects_the_pitch_of_the_callers_images) {
     EXPECT_EQ(std::memcmp(tight.frame.colour.row(r), padded.frame.colour.row(r), 96 * 3), 0);
     EXPECT_EQ(std::memcmp(tight.frame.truth_mask.row(r), padded.frame.truth_mask.row(r), 96), 0);
     for (int32_t c = 96; c < 101; ++c) {
-      EXPECT_EQ(padded.depth[static_cast<size_t>(r * 101 + c)], 0xabcd);
-      EXPECT_EQ(padded.mask[static_cast<size_t>(r * 101 + c)], 7);
+      EXPECT_EQ(padded.depth[static_cast<size_t>(r * 101 + c)], FrameMemory::kUntouchedDepth);
+      EXPECT_EQ(padded.mask[static_cast<size_t>(r * 101 + c)], FrameMemory::kUntouchedMask);
     }
   }
 }
@@ -227,7 +207,7 @@ TEST(SyntheticSource, odd_and_full_sizes_render) {
     const auto valid =
         memory.depth.size() - static_cast<size_t>(std::count(memory.depth.begin(), memory.depth.end(), 0));
     EXPECT_GT(valid, memory.depth.size() / 2);
-    EXPECT_EQ(std::count(memory.depth.begin(), memory.depth.end(), 0xabcd), 0);
+    EXPECT_EQ(std::count(memory.depth.begin(), memory.depth.end(), FrameMemory::kUntouchedDepth), 0);
   }
 }
 
