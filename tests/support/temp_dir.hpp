@@ -9,6 +9,21 @@
 
 namespace stillmap::test {
 
+inline void write_text(const std::string& path, const std::string& text) {
+  std::ofstream file(path, std::ios::binary);
+  file << text;
+  ASSERT_TRUE(file.flush().good()) << path;
+}
+
+inline std::string read_text(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+inline bool exists(const std::string& path) {
+  return std::filesystem::exists(path);
+}
+
 /// A folder of its own for one test, removed at its end.
 class TempDir {
  public:
@@ -25,26 +40,21 @@ class TempDir {
   TempDir& operator=(const TempDir&) = delete;
 
   const std::string& path() const { return path_; }
-  /// The path of `name` in the folder; folders on the way are made.
+  /// The path of `name` in the folder; nothing is made.
+  std::string path(const std::string& name) const { return path_ + "/" + name; }
+  /// The same; folders on the way are made.
   std::string operator/(const std::string& name) const {
-    const std::filesystem::path file = std::filesystem::path(path_) / name;
-    std::filesystem::create_directories(file.parent_path());
-    return file.string();
+    std::filesystem::create_directories(std::filesystem::path(path(name)).parent_path());
+    return path(name);
+  }
+  /// @return the path of the file
+  std::string write(const std::string& name, const std::string& text) const {
+    write_text(*this / name, text);
+    return path(name);
   }
 
  private:
   std::string path_;
 };
-
-inline void write_text(const std::string& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  ASSERT_TRUE(file.flush().good()) << path;
-}
-
-inline std::string read_text(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
 
 }  // namespace stillmap::test

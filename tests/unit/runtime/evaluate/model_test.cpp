@@ -9,7 +9,7 @@
 
 #include "runtime/evaluate/ply_reader.hpp"
 #include "runtime/evaluate/report.hpp"
-#include "tests/unit/runtime/evaluate/temp_dir.hpp"
+#include "tests/support/temp_dir.hpp"
 
 namespace stillmap {
 namespace {

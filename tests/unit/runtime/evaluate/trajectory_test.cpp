@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/unit/runtime/evaluate/temp_dir.hpp"
+#include "tests/support/temp_dir.hpp"
 
 namespace stillmap {
 namespace {

@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "runtime/picture/canvas.hpp"
 #include "runtime/picture/run_data.hpp"
-#include "tests/unit/runtime/evaluate/temp_dir.hpp"
+#include "tests/support/temp_dir.hpp"
 
 namespace stillmap {
 namespace {
@@ -261,8 +260,7 @@ TEST_F(Pictures, BrokenInputsAreErrorsThatNameTheFile) {
       {"snapshots/1305031229.433100_mask.png", "frames.png"},
       {"snapshots/1305031229.433100_map.png", "frames.png"}};
   for (const auto& [input, name] : broken) {
-    std::ifstream file(dir_.path(input), std::ios::binary);
-    const std::string good((std::istreambuf_iterator<char>(file)), {});
+    const std::string good = test::read_text(dir_.path(input));
     for (const std::string& bad :
          {std::string("garbage,\x01\x02"), good.substr(0, good.size() / 2) + "\n?", std::string()}) {
       dir_.write(input, bad);

@@ -4,15 +4,15 @@
 
 #include <string>
 
+#include "tests/support/temp_dir.hpp"
 #include "tests/unit/runtime/record/file_size_limit.hpp"
-#include "tests/unit/runtime/record/temp_dir.hpp"
 
 namespace stillmap {
 namespace {
 
 using test::exists;
 using test::FileSizeLimit;
-using test::read_all;
+using test::read_text;
 using test::TempDir;
 
 TEST(OutputFile, StreamEndsInPartUntilClosed) {
@@ -20,10 +20,10 @@ TEST(OutputFile, StreamEndsInPartUntilClosed) {
   auto file = OutputFile::create(dir.path("log.txt"), OutputFile::Kind::stream);
   ASSERT_TRUE(file) << file.error();
   ASSERT_TRUE(file->write("one\n"));
-  EXPECT_EQ(read_all(dir.path("log.txt.part")), "one\n");  // a reader sees every record at once
+  EXPECT_EQ(read_text(dir.path("log.txt.part")), "one\n");  // a reader sees every record at once
   EXPECT_FALSE(exists(dir.path("log.txt")));
   ASSERT_TRUE(file->close());
-  EXPECT_EQ(read_all(dir.path("log.txt")), "one\n");
+  EXPECT_EQ(read_text(dir.path("log.txt")), "one\n");
   EXPECT_FALSE(exists(dir.path("log.txt.part")));
 }
 
@@ -35,7 +35,7 @@ TEST(OutputFile, WholeFileThatIsNotClosedLeavesNothingAndTheOldOneStays) {
     ASSERT_TRUE(file);
     ASSERT_TRUE(file->write("new"));
   }
-  EXPECT_EQ(read_all(dir.path("a")), "old");
+  EXPECT_EQ(read_text(dir.path("a")), "old");
   EXPECT_FALSE(exists(dir.path("a.part")));
 }
 
@@ -53,7 +53,7 @@ TEST(OutputFile, FullDiskKeepsTheWholeRecordsOfAStream) {
   EXPECT_NE(file->error().find(dir.path("log.txt")), std::string::npos) << file->error();
   EXPECT_NE(file->error().find("File too large"), std::string::npos) << file->error();
   EXPECT_FALSE(file->close());  // the failure is not forgotten
-  EXPECT_EQ(read_all(dir.path("log.txt")), "0123456789\n0123456789\n");
+  EXPECT_EQ(read_text(dir.path("log.txt")), "0123456789\n0123456789\n");
 }
 
 TEST(OutputFile, FullDiskRemovesAHalfWholeFile) {
@@ -93,7 +93,7 @@ TEST(OutputFile, BigWholeFileComesOutByteForByte) {
   const std::string block(600000, 'b');  // larger than the buffer
   ASSERT_TRUE(file->write(block));
   ASSERT_TRUE(file->close());
-  EXPECT_EQ(read_all(dir.path("big")), content + block);
+  EXPECT_EQ(read_text(dir.path("big")), content + block);
 }
 
 }  // namespace

@@ -8,15 +8,15 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/temp_dir.hpp"
 #include "tests/unit/runtime/record/file_size_limit.hpp"
-#include "tests/unit/runtime/record/temp_dir.hpp"
 
 namespace stillmap {
 namespace {
 
 using test::exists;
 using test::FileSizeLimit;
-using test::read_all;
+using test::read_text;
 using test::TempDir;
 
 const std::vector<Vec3> kPositions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1.5f}};
@@ -41,7 +41,7 @@ TEST(PlyWriter, WritesTheContractsForm) {
   PlyWriter writer(dir.path("mesh.ply"));
   give_mesh(writer);
   ASSERT_TRUE(writer.close()) << writer.error();
-  const std::string text = read_all(dir.path("mesh.ply"));
+  const std::string text = read_text(dir.path("mesh.ply"));
   const std::string end = "end_header\n";
   const size_t body = text.find(end) + end.size();
   EXPECT_EQ(text.rfind("ply\nformat binary_little_endian 1.0\n", 0), 0u);
@@ -66,7 +66,7 @@ TEST(PlyWriter, EmptyMeshIsAValidFile) {
   PlyWriter writer(dir.path("mesh.ply"));
   ASSERT_TRUE(writer.begin(0, 0));
   ASSERT_TRUE(writer.close());
-  EXPECT_NE(read_all(dir.path("mesh.ply")).find("element face 0\n"), std::string::npos);
+  EXPECT_NE(read_text(dir.path("mesh.ply")).find("element face 0\n"), std::string::npos);
 }
 
 TEST(PlyWriter, MissingPartsLeaveNoFile) {
@@ -105,7 +105,7 @@ TEST(PlyWriter, RefusesWhatNoViewerReads) {
   EXPECT_FALSE(nan.vertices(part(bad, 0, 1), part(kColours, 0, 1)));
   PlyWriter many(dir.path("c.ply"));
   EXPECT_FALSE(many.begin(3'000'000'000, 1));
-  EXPECT_TRUE(std::filesystem::is_empty(dir.dir()));
+  EXPECT_TRUE(std::filesystem::is_empty(dir.path()));
 }
 
 TEST(PlyWriter, FullDiskKeepsTheMeshOfBefore) {
@@ -113,7 +113,7 @@ TEST(PlyWriter, FullDiskKeepsTheMeshOfBefore) {
   PlyWriter first(dir.path("mesh.ply"));
   give_mesh(first);
   ASSERT_TRUE(first.close());
-  const std::string before = read_all(dir.path("mesh.ply"));
+  const std::string before = read_text(dir.path("mesh.ply"));
   FileSizeLimit full(100);
   PlyWriter second(dir.path("mesh.ply"));
   ASSERT_TRUE(second.begin(4, 2));
@@ -121,13 +121,13 @@ TEST(PlyWriter, FullDiskKeepsTheMeshOfBefore) {
   second.triangles(part(kIndices, 0, 6));
   EXPECT_FALSE(second.close());
   EXPECT_NE(second.error().find("File too large"), std::string::npos) << second.error();
-  EXPECT_EQ(read_all(dir.path("mesh.ply")), before);
+  EXPECT_EQ(read_text(dir.path("mesh.ply")), before);
 }
 
 TEST(PointCloud, IsAPlyOfPoints) {
   TempDir dir;
   ASSERT_EQ(write_point_cloud(dir.path("cloud.ply"), kPositions), "");
-  const std::string text = read_all(dir.path("cloud.ply"));
+  const std::string text = read_text(dir.path("cloud.ply"));
   EXPECT_NE(text.find("element vertex 4\nproperty float x\nproperty float y\nproperty float z\nend_header\n"),
             std::string::npos);
   EXPECT_EQ(text.size() - (text.find("end_header\n") + 11), 4u * 12);

@@ -7,13 +7,13 @@
 #include <string>
 
 #include "runtime/record/output_file.hpp"
-#include "tests/unit/runtime/record/temp_dir.hpp"
+#include "tests/support/temp_dir.hpp"
 
 namespace stillmap {
 namespace {
 
 using test::exists;
-using test::read_all;
+using test::read_text;
 using test::TempDir;
 
 void leave_run(const std::string& dir, const std::string& mark) {
@@ -34,43 +34,43 @@ TEST(RunFolder, IsMadeWithItsParents) {
 TEST(RunFolder, MovesEarlierRunsAndKeepsTheNewestOnes) {
   TempDir dir;
   for (const std::string mark : {"first", "second", "third", "fourth"}) {
-    ASSERT_TRUE(RunFolder::open(dir.dir(), 2));
+    ASSERT_TRUE(RunFolder::open(dir.path(), 2));
     EXPECT_FALSE(exists(dir.path("trajectory.txt")));
     EXPECT_FALSE(exists(dir.path("events.log.part")));
-    leave_run(dir.dir(), mark);
+    leave_run(dir.path(), mark);
   }
-  EXPECT_EQ(read_all(dir.path("trajectory.txt")), "fourth");
-  EXPECT_EQ(read_all(dir.path("previous-1/trajectory.txt")), "third");
-  EXPECT_EQ(read_all(dir.path("previous-1/masks/0.000000.png")), "third");
-  EXPECT_EQ(read_all(dir.path("previous-2/trajectory.txt")), "second");
+  EXPECT_EQ(read_text(dir.path("trajectory.txt")), "fourth");
+  EXPECT_EQ(read_text(dir.path("previous-1/trajectory.txt")), "third");
+  EXPECT_EQ(read_text(dir.path("previous-1/masks/0.000000.png")), "third");
+  EXPECT_EQ(read_text(dir.path("previous-2/trajectory.txt")), "second");
   EXPECT_FALSE(exists(dir.path("previous-3")));
 }
 
 TEST(RunFolder, FewerKeptRemovesTheOlderOnes) {
   TempDir dir;
   for (int i = 0; i < 4; ++i) {
-    ASSERT_TRUE(RunFolder::open(dir.dir(), 3));
-    leave_run(dir.dir(), std::to_string(i));
+    ASSERT_TRUE(RunFolder::open(dir.path(), 3));
+    leave_run(dir.path(), std::to_string(i));
   }
-  ASSERT_TRUE(RunFolder::open(dir.dir(), 1));
-  EXPECT_EQ(read_all(dir.path("previous-1/trajectory.txt")), "3");
+  ASSERT_TRUE(RunFolder::open(dir.path(), 1));
+  EXPECT_EQ(read_text(dir.path("previous-1/trajectory.txt")), "3");
   EXPECT_FALSE(exists(dir.path("previous-2")));
   EXPECT_FALSE(exists(dir.path("previous-3")));
 }
 
 TEST(RunFolder, KeepNoneRemovesTheEarlierRun) {
   TempDir dir;
-  leave_run(dir.dir(), "old");
-  ASSERT_TRUE(RunFolder::open(dir.dir(), 0));
-  EXPECT_TRUE(std::filesystem::is_empty(dir.dir()));
+  leave_run(dir.path(), "old");
+  ASSERT_TRUE(RunFolder::open(dir.path(), 0));
+  EXPECT_TRUE(std::filesystem::is_empty(dir.path()));
 }
 
 TEST(RunFolder, LeavesOtherFilesAlone) {
   TempDir dir;
-  leave_run(dir.dir(), "old");
+  leave_run(dir.path(), "old");
   ASSERT_EQ(write_whole_file(dir.path("notes.md"), "mine"), "");
-  ASSERT_TRUE(RunFolder::open(dir.dir(), 0));
-  EXPECT_EQ(read_all(dir.path("notes.md")), "mine");
+  ASSERT_TRUE(RunFolder::open(dir.path(), 0));
+  EXPECT_EQ(read_text(dir.path("notes.md")), "mine");
 }
 
 TEST(RunFolder, FileInTheWayIsNamed) {

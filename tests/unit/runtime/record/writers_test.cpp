@@ -6,12 +6,12 @@
 #include "runtime/record/events_log.hpp"
 #include "runtime/record/states_writer.hpp"
 #include "runtime/record/trajectory_writer.hpp"
-#include "tests/unit/runtime/record/temp_dir.hpp"
+#include "tests/support/temp_dir.hpp"
 
 namespace stillmap {
 namespace {
 
-using test::read_all;
+using test::read_text;
 using test::TempDir;
 
 auto count_lines(const std::string& text) {
@@ -38,7 +38,7 @@ TEST(TrajectoryWriter, WritesTumLines) {
   ASSERT_TRUE(writer->write(Stamp{1234567000}, T_map_cam));
   ASSERT_TRUE(writer->file().close());
   EXPECT_EQ(
-      read_all(dir.path("trajectory.txt")),
+      read_text(dir.path("trajectory.txt")),
       "0.000000 0.000000000 0.000000000 0.000000000 0.000000000 0.000000000 0.000000000 1.000000000\n"
       "1.234567 1.500000000 -2.000000000 0.250000000 0.000000000 0.000000000 0.707106781 0.707106781\n");
 }
@@ -55,7 +55,7 @@ TEST(StatesWriter, HasTheContractsColumnsAndTheTriangle) {
   result.covariance[20] = 4e-6f;
   ASSERT_TRUE(writer->write(result));
   ASSERT_TRUE(writer->file().close());
-  const std::string text = read_all(dir.path("states.csv"));
+  const std::string text = read_text(dir.path("states.csv"));
   const std::string header = text.substr(0, text.find('\n'));
   const std::string line = text.substr(header.size() + 1);
   EXPECT_EQ(header.substr(0, 63), "stamp,state,p_good,inlier_ratio,masked_fraction,cov_x_x,cov_x_y");
@@ -74,7 +74,7 @@ TEST(TimingWriter, WritesALineAFrame) {
   result.ms = {1, 2, 3, 4, 5, 15.5f};
   ASSERT_TRUE(writer->write(result));
   ASSERT_TRUE(writer->file().close());
-  EXPECT_EQ(read_all(dir.path("timing.csv")),
+  EXPECT_EQ(read_text(dir.path("timing.csv")),
             "stamp,prepare_ms,track_ms,mask_ms,refine_ms,integrate_ms,total_ms\n"
             "1.000000,1.0000,2.0000,3.0000,4.0000,5.0000,15.5000\n");
 }
@@ -87,7 +87,7 @@ TEST(EventsLog, CountsFaultsAndKeepsEachEventOnOneLine) {
   log->fault(Stamp{1000000000}, "bad_frame", "a.png:\ntruncated");
   log->fault(Stamp{2000000000}, "bad_frame", "b.png");
   ASSERT_TRUE(log->close());
-  EXPECT_EQ(read_all(dir.path("events.log")),
+  EXPECT_EQ(read_text(dir.path("events.log")),
             "0.000000 info start: tum:x\n1.000000 fault bad_frame: a.png: truncated\n"
             "2.000000 fault bad_frame: b.png\n");
   ASSERT_EQ(log->faults().size(), 1u);
@@ -101,7 +101,7 @@ TEST(EventsLog, AFaultInEveryFrameDoesNotFillTheDisk) {
   for (uint32_t i = 0; i < EventsLog::kMaxLinesPerName + 500; ++i) log->fault(Stamp{0}, "bad_frame", "x");
   log->fault(Stamp{0}, "map_full", "y");
   ASSERT_TRUE(log->close());
-  EXPECT_EQ(count_lines(read_all(dir.path("events.log"))), EventsLog::kMaxLinesPerName + 1);
+  EXPECT_EQ(count_lines(read_text(dir.path("events.log"))), EventsLog::kMaxLinesPerName + 1);
   EXPECT_EQ(log->faults().at("bad_frame"), EventsLog::kMaxLinesPerName + 500);
 }
 
