@@ -7,14 +7,13 @@
 #include "config/describe.hpp"
 #include "config/fields.hpp"
 #include "config/validate.hpp"
+#include "tests/support/contains.hpp"
 #include "tests/support/temp_dir.hpp"
 
 namespace stillmap {
 namespace {
 
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
+using test::contains;
 
 std::string error_of(const std::string& toml) {
   const Result<Config> config = parse_config(toml, "test.toml");

@@ -2,15 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/contains.hpp"
 #include "tests/support/frame_memory.hpp"
 #include "tests/support/tiny_dataset.hpp"
 
 namespace stillmap {
 namespace {
 
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
+using test::contains;
 
 void expect_refused(const std::string& source, ErrorKind kind, const std::string& message) {
   const Result<std::unique_ptr<FrameSource>> opened = open_source(source, {});

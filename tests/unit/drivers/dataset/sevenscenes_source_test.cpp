@@ -5,21 +5,19 @@
 #include <filesystem>
 #include <random>
 
+#include "tests/support/contains.hpp"
 #include "tests/support/frame_memory.hpp"
 #include "tests/support/tiny_dataset.hpp"
 
 namespace stillmap {
 namespace {
 
+using test::contains;
 using test::FrameMemory;
 using test::sevenscenes_name;
 using test::TempDir;
 
 constexpr const char* kPose = "0 -1 0 1.5\n1 0 0 -2.5\n0 0 1 3.5\n0 0 0 1\n";
-
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
 
 std::unique_ptr<FrameSource> open(const TempDir& dir) {
   if (!std::filesystem::exists(dir / "camera.toml")) test::write_text(dir / "camera.toml", test::kTinyCamera);

@@ -6,18 +6,16 @@
 #include <limits>
 #include <random>
 
+#include "tests/support/contains.hpp"
 #include "tests/support/frame_memory.hpp"
 #include "tests/support/tiny_dataset.hpp"
 
 namespace stillmap {
 namespace {
 
+using test::contains;
 using test::FrameMemory;
 using test::TempDir;
-
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
 
 /// A folder with the images 0, 1, 2 and intrinsics, without lists.
 class TumSource : public ::testing::Test {

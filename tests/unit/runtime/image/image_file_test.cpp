@@ -10,18 +10,16 @@
 #include <filesystem>
 #include <random>
 
+#include "tests/support/contains.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/support/test_image.hpp"
 
 namespace stillmap {
 namespace {
 
+using test::contains;
 using test::TempDir;
 using test::TestImage;
-
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
 
 /// Bytes of a PNG of any kind, made by the library itself.
 std::string png_bytes(uint32_t width, uint32_t height, uint8_t bits, uint8_t colour_type,
