@@ -36,11 +36,6 @@ Error bad(std::string message) {
   return {std::move(message), ErrorKind::bad_usage};
 }
 
-bool is_there(const std::string& path) {
-  std::error_code ignored;
-  return std::filesystem::exists(path, ignored);
-}
-
 CameraModel model_of(const CameraFile& file) {
   const auto& pinhole = *file.fx_fy_cx_cy;
   const auto& d = file.distortion;

@@ -30,6 +30,11 @@ std::string stamp_label(Stamp stamp) {
   return fmt::format("{:.6f}", stamp.seconds());
 }
 
+bool is_there(const std::filesystem::path& path) {
+  std::error_code ignored;
+  return std::filesystem::exists(path, ignored);
+}
+
 Result<TextFile> TextFile::read(const std::string& path) {
   Result<std::string> content = read_file(path, kMaxTextBytes);
   if (!content) return Error{content.error(), ErrorKind::cannot_open};

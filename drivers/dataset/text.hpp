@@ -1,7 +1,8 @@
 #pragma once
 
-// Lines and words of the text files in a recording.
+// The files of a recording: which of them are there, lines and words of the text files.
 
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -17,6 +18,9 @@ std::vector<std::string_view> words_of(std::string_view line);
 
 /// Seconds with six digits, as the trajectory files have them.
 std::string stamp_label(Stamp stamp);
+
+/// Whether a recording has this file or folder; what nobody may look at is not there.
+bool is_there(const std::filesystem::path& path);
 
 /// One line of a text file that is no comment and not empty.
 struct TextLine {

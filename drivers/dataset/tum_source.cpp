@@ -24,11 +24,6 @@ Error cannot_open(std::string message) {
   return {std::move(message), ErrorKind::cannot_open};
 }
 
-bool is_there(const fs::path& path) {
-  std::error_code ignored;
-  return fs::exists(path, ignored);
-}
-
 int64_t ns_of_ms(double ms) {
   return std::llround(ms * 1e6);
 }
