@@ -130,10 +130,6 @@ float light(Vec3 p, Vec3 normal) {
   return 0.45f + 0.7f * lamp / (1.0f + 0.1f * distance2) + 0.16f * window + 0.05f * normal.z;
 }
 
-uint8_t to_byte(float v) {
-  return static_cast<uint8_t>(std::clamp(v + 0.5f, 0.0f, 255.0f));
-}
-
 }  // namespace
 
 void cover_lens(IdealImages& images) {

@@ -2,6 +2,7 @@
 
 // Exact images of a World: what an ideal camera would see.
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -20,6 +21,11 @@ struct IdealImages {
   std::vector<Rgb8> colour;
   std::vector<uint8_t> mask;  ///< 255: the visible surface moves
 };
+
+/// A channel of a colour, rounded and kept within 0..255.
+inline uint8_t to_byte(float v) {
+  return static_cast<uint8_t>(std::clamp(v + 0.5f, 0.0f, 255.0f));
+}
 
 /// What a camera sees with a hand on its lens: dark, nearer than it can measure, all of it moving.
 void cover_lens(IdealImages& images);

@@ -274,9 +274,11 @@ void haul(const Haul& h, const Place& place, double t, World& world) {
 }
 
 /// What such a box stands on.
-void add_table(World& world, Spot2 at, float half_x, float half_y, float height_m) {
-  add_box(world, to_float(at.x, at.y, 0.5 * static_cast<double>(height_m)), {half_x, half_y, 0.5f * height_m},
-          0.0f, {Pattern::planks, {70, 60, 52}, {130, 116, 100}, 0.10f, 7}, false);
+void add_table(World& world, const Haul& h, Spot2 at) {
+  const float height_m = h.rest_height_m - h.half_m.z;
+  add_box(world, to_float(at.x, at.y, 0.5 * static_cast<double>(height_m)),
+          {h.half_m.x, h.half_m.y, 0.5f * height_m}, 0.0f,
+          {Pattern::planks, {70, 60, 52}, {130, 116, 100}, 0.10f, 7}, false);
 }
 
 constexpr Haul kMovingBox = {{0.16f, 0.41f, 0.42f}, 0.80f + 0.42f, 0.6, 3.2, 1};
@@ -284,8 +286,7 @@ constexpr Spot2 kMovingBoxRest = {-0.38, 0.0};
 
 void bare_with_moving_table(World& world) {
   bare_room(world);
-  add_table(world, kMovingBoxRest, kMovingBox.half_m.x, kMovingBox.half_m.y,
-            kMovingBox.rest_height_m - kMovingBox.half_m.z);
+  add_table(world, kMovingBox, kMovingBoxRest);
 }
 
 Se3d moving_box_camera(double t) {
@@ -415,8 +416,7 @@ constexpr Spot2 kKidnappedRest = {-0.42, 0.0};
 
 void bare_with_kidnapping_table(World& world) {
   bare_room(world);
-  add_table(world, kKidnappedRest, kKidnappedBox.half_m.x, kKidnappedBox.half_m.y,
-            kKidnappedBox.rest_height_m - kKidnappedBox.half_m.z);
+  add_table(world, kKidnappedBox, kKidnappedRest);
 }
 
 void kidnapping_movers(double t, World& world) {

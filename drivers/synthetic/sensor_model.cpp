@@ -17,10 +17,6 @@ float degrees_cos(float degrees) {
   return static_cast<float>(std::cos(static_cast<double>(degrees) * kPi / 180.0));
 }
 
-uint8_t to_byte(float v) {
-  return static_cast<uint8_t>(std::clamp(v + 0.5f, 0.0f, 255.0f));
-}
-
 }  // namespace
 
 SensorModel::SensorModel(const Intrinsics& k, float depth_units_per_m, uint64_t seed)
