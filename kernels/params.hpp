@@ -74,7 +74,7 @@ struct TrackParams {
   float lost_inlier_ratio = 0.2f;
   float poor_inlier_ratio = 0.4f;
   float inlier_m = 0.03f;
-  float correlated_points = 80.0f;
+  float correlated_points = 100.0f;
 
   template <class F>
   static void fields(F&& f) {
@@ -157,7 +157,7 @@ struct MaskParams {
   float blob_m2 = 0.004f;
   float grow_m = 0.03f;
   bool warp = true;
-  int32_t reabsorb_frames = 60;
+  int32_t reabsorb_frames = 30;
 
   template <class F>
   static void fields(F&& f) {

@@ -30,7 +30,11 @@ struct FrameGeometry {
   float truncation_m = 0;
 };
 
-constexpr float kMoverGap = 0.4f;  ///< of tau: this far before a mover space is free
+// A surface well inside what was free: a quarter of the weight, four times, and it is as if nothing was
+// known.
+constexpr float kRelearnFactor = 0.25f;
+constexpr float kFreeShare = 0.3f;  ///< of tau
+constexpr float kMoverGap = 0.4f;   ///< of tau: this far before a mover space is free
 
 /// Projective signed distance along the optical axis: measured depth minus depth of the voxel.
 ///                                                                       test: integrate_test
@@ -106,9 +110,10 @@ STILLMAP_HD VoxelState<F> fused(VoxelState<F> v, const Observation<F>& o, F luma
   const MaskOf<F> any = o.free | o.band;
   const F old = select(v.weight > F(0.0f), v.sdf, F(0.0f));
   const F observed = select(o.band, o.sdf_m * F(p.units_per_m), tau);
-  if (p.relearn)
-    v.weight =
-        select(o.band & (old - observed > F(0.5f) * tau), to_float(to_int(F(0.5f) * v.weight)), v.weight);
+  if (p.relearn) {
+    const MaskOf<F> was_free = (old > F(kFreeShare) * tau) & (old - observed > F(kFreeShare) * tau);
+    v.weight = select(o.band & was_free, to_float(to_int(F(kRelearnFactor) * v.weight)), v.weight);
+  }
   const F mean = round_nearest(old + (observed - old) / (v.weight + one));
   const F sdf = select(o.band, mean, min_of(max_of(mean, old + one), tau));
   const F share = one / (v.colour_weight + one);

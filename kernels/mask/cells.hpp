@@ -20,26 +20,46 @@ STILLMAP_HD int32_t cell_px_for(int32_t image_cols) {
   return px < 1 ? 1 : px;
 }
 
-/// What the map says about a cell: 0 near the mapped surface, 1 well away from it (in space that was seen
-/// free, or behind a surface by less than tau), between them doubt.
+/// What the map says about a cell: 0 near the mapped surface, 1 well before it in space that was seen free,
+/// between them doubt.
 using Contradiction = float;
 constexpr Contradiction kUnknown = -1.0f;  ///< no measurement, or nothing was ever observed there
+/// Well behind a mapped surface: that one is gone, which says nothing of what is seen in its stead.
+constexpr Contradiction kBehind = -2.0f;
 
-constexpr uint8_t kDoubted =
-    1;  ///< of an expected mask: static, but not what the map says; no help to tracking
+/// Of an expected mask: static, but not what the map says; no help to tracking.
+constexpr uint8_t kDoubted = 1;
+
+/// From here on a cell counts as contradicting the map.
+constexpr Contradiction kContradicts = 0.5f;
+
+/// Tracking gets no help from it.
+STILLMAP_HD bool doubted(Contradiction c) {
+  return c >= kContradicts || c == kBehind;
+}
+
+/// A frame that shows another brightness takes back so many of the frames that a cell stood still: noise
+/// alone does it now and then.
+constexpr int32_t kOtherLumaFrames = 8;
+constexpr float kSameLuma = 0.1f;   ///< of white: brightness that noise and resampling change
+constexpr float kStillM = 0.01f;    ///< what stands still may seem to lie off, without noise
+constexpr float kNearestM = 0.05f;  ///< nearer than this nothing is projected
 
 /// Standard deviation of a depth measurement, metres.
 struct DepthNoise {
-  float close_m = 0.001f, per_m2 = 0.0015f;
+  float close_m, per_m2;
 
   STILLMAP_HD float at(float z_m) const { return close_m + per_m2 * z_m * z_m; }
 };
 
+inline DepthNoise depth_noise(const DepthParams& params) {
+  return {params.noise_m, params.noise_per_m2};
+}
+
 /// A cell against the map: what it adds to the least squares of its part (paper Eq. (4), at one point).
 struct CellResidual {
-  PointTerms<float> terms;
-  Vec3 arm;          ///< camera centre to point, metres, map axes
-  float weight = 0;  ///< robust, and by the sensor's noise; 0: no value in the map
+  PointTerms<float> terms;  ///< depth_weight 0: no surface in the map there
+  Vec3 arm;                 ///< camera centre to point, metres, map axes
 };
 
 /// Images of the size of the cell grid.
@@ -68,9 +88,11 @@ STILLMAP_HD Intrinsics cell_intrinsics(const Intrinsics& k, int32_t px) {
   return {k.fx * s, k.fy * s, (k.cx - half) * s, (k.cy - half) * s, k.width / px, k.height / px};
 }
 
-/// A jump between neighbouring measurements that parts two surfaces (facts of the sensor: over its noise).
+/// A jump between neighbouring measurements that parts two surfaces: three times what a slanted surface shows
+/// from one cell to the next, and never less than what the sensor smears at an edge.
 STILLMAP_HD float depth_edge_m(float z_m) {
-  return fmaxf(0.025f * z_m, 0.03f);
+  constexpr float kShare = 0.025f, kLeastM = 0.03f;
+  return fmaxf(kShare * z_m, kLeastM);
 }
 
 /// Depth of one cell: the mean of the pixels that lie on the surface in its middle.
@@ -98,7 +120,7 @@ struct CellDepthPass {
 
  private:
   STILLMAP_HD bool usable(float z_m) const { return z_m > 0.0f && z_m <= max_m; }
-  /// First usable depth, from the middle outwards on the diagonal, then any.
+  /// Depth of the pixel in the middle, or of the first one that has any.
   STILLMAP_HD float reference(int32_t r0, int32_t c0) const {
     const int32_t middle = cells.px / 2;
     if (usable(depth_m.at(r0 + middle, c0 + middle))) return depth_m.at(r0 + middle, c0 + middle);
@@ -147,23 +169,22 @@ struct CellEvidencePass {
   CellGrid cells;
   TrackPass track;  ///< its pose, map and weights; the camera is that of the grid
   DepthNoise noise;
-  float contradict_m = 0.02f;
-  float contradict_sigmas = 2.0f;
+  float contradict_m;
+  float contradict_sigmas;
 
   template <class Cache>
   STILLMAP_HD void operator()(int32_t row, int32_t col, Cache& cache) const {
     const float z_m = cells.depth_m.at(row, col);
-    CellResidual residual;
+    CellResidual residual = {};
     Contradiction contradiction = kUnknown;
     TrackPoint<float> point;
     if (track.fetch(row, col, z_m, cells.luma.at(row, col), cache, point)) {
       residual.terms = point_terms(point, track.weights);
       residual.arm = point.arm;
-      residual.weight = residual.terms.depth_weight;
       const float limit_m =
           fminf(contradict_m + contradict_sigmas * noise.at(z_m), 0.9f * track.map.truncation_m);
-      const float off = fabsf(residual.terms.depth_residual_m) / limit_m;
-      contradiction = fminf(fmaxf(2.0f * (off - 0.5f), 0.0f), 1.0f);
+      const float off = residual.terms.depth_residual_m / limit_m;
+      contradiction = off < -1.0f ? kBehind : fminf(fmaxf(2.0f * (off - 0.5f), 0.0f), 1.0f);
     }
     cells.residual.at(row, col) = residual;
     cells.evidence.at(row, col) = contradiction;
@@ -185,30 +206,31 @@ struct StillPass {
   DepthNoise noise;
 
   STILLMAP_HD void operator()(int32_t row, int32_t col) const {
-    const float z_m = cells.depth_m.at(row, col);
     int32_t frames = 0;
     float crept_m = 0;
-    if (z_m > 0.0f) {
-      const Vec3 p = T_before_now * cells.point(row, col);
-      const Pixel at = project(cells.k, p);
-      const int32_t r = static_cast<int32_t>(floorf(at.v + 0.5f)),
-                    c = static_cast<int32_t>(floorf(at.u + 0.5f));
-      if (p.z > 0.0f && before.depth_m.contains(r, c) && before.depth_m.at(r, c) > 0.0f) {
-        const Vec3 was =
-            unproject(cells.k, static_cast<float>(c), static_cast<float>(r), before.depth_m.at(r, c));
-        // Along the normal: the cell need not be met in its middle.
-        const float off_m = dot(T_before_now.rotation * cells.normal.at(row, col), p - was);
-        const float near_m = 0.01f + 2.0f * noise.at(z_m);
-        const bool same = fabsf(before.luma.at(r, c) - cells.luma.at(row, col)) < 0.1f * kLumaScale;
-        crept_m = before.crept_m.at(r, c) + off_m;
-        if (fabsf(was.z - p.z) > depth_edge_m(z_m) + near_m || fabsf(crept_m) > near_m)
-          crept_m = 0;
-        else  // noise alone changes the brightness now and then
-          frames = before.still.at(r, c) + (same ? 1 : -8);
-      }
-    }
+    if (cells.depth_m.at(row, col) > 0.0f) look_back(row, col, frames, crept_m);
     cells.crept_m.at(row, col) = crept_m;
     cells.still.at(row, col) = static_cast<uint8_t>(frames < 0 ? 0 : frames < 255 ? frames : 255);
+  }
+
+ private:
+  STILLMAP_HD void look_back(int32_t row, int32_t col, int32_t& frames, float& crept_m) const {
+    const Vec3 p = T_before_now * cells.point(row, col);
+    if (p.z < kNearestM) return;
+    const Pixel at = project(cells.k, p);
+    const int32_t r = static_cast<int32_t>(floorf(at.v + 0.5f)),
+                  c = static_cast<int32_t>(floorf(at.u + 0.5f));
+    if (!before.depth_m.contains(r, c) || before.depth_m.at(r, c) <= 0.0f) return;
+    const Vec3 was =
+        unproject(cells.k, static_cast<float>(c), static_cast<float>(r), before.depth_m.at(r, c));
+    // Along the normal: the cell need not be met in its middle.
+    const float off_m =
+        before.crept_m.at(r, c) + dot(T_before_now.rotation * cells.normal.at(row, col), p - was);
+    const float z_m = cells.depth_m.at(row, col), near_m = kStillM + 2.0f * noise.at(z_m);
+    if (fabsf(was.z - p.z) > depth_edge_m(z_m) + near_m || fabsf(off_m) > near_m) return;
+    crept_m = off_m;
+    const bool same = fabsf(before.luma.at(r, c) - cells.luma.at(row, col)) < kSameLuma * kLumaScale;
+    frames = before.still.at(r, c) + (same ? 1 : -kOtherLumaFrames);
   }
 };
 
@@ -221,7 +243,9 @@ struct StaticPixelPass {
   DepthNoise noise;
   float trust_noise_m = 0;  ///< 0: noise changes no trust
   float trust_area_m = 0;
-  float expected_trust = 0;
+
+  /// What is expected to move keeps this much trust until the mask is known: it may have stopped.
+  static constexpr float kExpectedTrust = 0.1f;
 
   STILLMAP_HD void operator()(int32_t row, int32_t col) const {
     const int32_t r = clamped(row / cells.px, cells.depth_m.rows),
@@ -243,8 +267,8 @@ struct StaticPixelPass {
       const float s = z_m / trust_area_m;
       t *= fminf(1.0f, s * s);
     }
-    if (mask.data && cells.evidence.at(r, c) >= 0.5f) t = 0.0f;
-    if (dynamic) t *= mask.data ? 0.0f : expected_trust;
+    if (mask.data && doubted(cells.evidence.at(r, c))) t = 0.0f;
+    if (dynamic) t *= mask.data ? 0.0f : kExpectedTrust;
     trust.at(row, col) = static_cast<uint8_t>(t + 0.5f);
   }
 

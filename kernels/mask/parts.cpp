@@ -8,6 +8,15 @@ namespace {
 
 constexpr uint8_t kSet = 255;
 
+constexpr float kJoinedM = 0.02f;    ///< neighbouring cells this near in depth are one surface, without noise
+constexpr float kOnePlaneM = 0.01f;  ///< and so are cells this near to each other's plane
+constexpr float kSettledShare = 0.6f;      ///< of a part that stands still: the rest is its rim
+constexpr float kHardlyKnownShare = 0.2f;  ///< of a part: the map knows too little to say what it is
+constexpr double kNearShare =
+    0.5;  ///< of a part must lie near a mapped surface, that it can have moved from it
+constexpr float kWasMovingFactor = 0.7f;  ///< hysteresis: what moved is asked for less
+constexpr float kMostOfTheSpace = 0.5f;   ///< with more of it on the move nothing was agreed on
+
 bool has_normal(Vec3 n) {
   return dot(n, n) > 0.5f;
 }
@@ -26,13 +35,18 @@ bool joined(const CellGrid& cells, int32_t ra, int32_t ca, int32_t rb, int32_t c
   const float za = cells.depth_m.at(ra, ca), zb = cells.depth_m.at(rb, cb);
   if (za <= 0.0f || zb <= 0.0f) return false;
   const float jump_m = std::fabs(za - zb);
-  if (jump_m < 0.02f + 2.0f * noise.at(za)) return true;
+  if (jump_m < kJoinedM + 2.0f * noise.at(za)) return true;
   const Vec3 na = cells.normal.at(ra, ca), nb = cells.normal.at(rb, cb);
   if (!has_normal(na) || !has_normal(nb)) return false;
   const Vec3 step = cells.point(rb, cb) - cells.point(ra, ca);
-  const float tolerance_m = 0.01f + 2.0f * noise.at(za);
+  const float tolerance_m = kOnePlaneM + 2.0f * noise.at(za);
   return std::fabs(dot(na, step)) < tolerance_m && std::fabs(dot(nb, step)) < tolerance_m &&
          jump_m < 4.0f * depth_edge_m(za);
+}
+
+/// Stood still for so long that it is static, whatever the map says.
+bool settled(const CellGrid& cells, int32_t r, int32_t c, const MaskParams& params) {
+  return params.reabsorb_frames < 255 && cells.still.at(r, c) >= params.reabsorb_frames;
 }
 
 float cell_area_m2(const CellGrid& cells, int32_t r, int32_t c) {
@@ -66,10 +80,10 @@ void flood(const CellGrid& cells, const PartMemory& memory, const DepthNoise& no
   }
 }
 
-/// Gives the cells on bends to the neighbouring part that is nearest in depth; twice, as bends are two cells
-/// wide on each side.
+/// Gives the cells on bends to the neighbouring part that is nearest in depth.
 void settle_borders(const CellGrid& cells, const PartMemory& memory) {
-  for (int32_t pass = 0; pass < 3; ++pass)
+  constexpr int32_t kPasses = 3;  // bends are two cells wide on each side
+  for (int32_t pass = 0; pass < kPasses; ++pass)
     for (int32_t r = 0; r < cells.part.rows; ++r)
       for (int32_t c = 0; c < cells.part.cols; ++c) {
         if (cells.part.at(r, c) >= 0 || cells.depth_m.at(r, c) <= 0.0f || !memory.border.at(r, c)) continue;
@@ -153,16 +167,31 @@ int32_t segment(const CellGrid& cells, const PartMemory& memory, const MaskParam
   return parts;
 }
 
-void gather_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory, const MaskParams& params) {
-  const DepthNoise noise;
+namespace {
+
+void add_to_box(Part& part, int32_t r, int32_t c) {
+  if (part.cells == 0) {
+    part.row0 = r;
+    part.col0 = part.col1 = c;
+  }
+  part.row1 = r + 1;  // rows come in order
+  part.col0 = std::min(part.col0, c);
+  part.col1 = std::max(part.col1, c + 1);
+}
+
+}  // namespace
+
+void gather_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory, const MaskParams& params,
+                  const DepthNoise& noise) {
   for (int32_t i = 0; i < parts; ++i) memory.parts[static_cast<uint32_t>(i)] = {};
   for (int32_t r = 0; r < cells.part.rows; ++r)
     for (int32_t c = 0; c < cells.part.cols; ++c) {
       if (cells.part.at(r, c) < 0) continue;
       Part& part = memory.parts[static_cast<uint32_t>(cells.part.at(r, c))];
       const Contradiction contradiction = cells.evidence.at(r, c);
+      add_to_box(part, r, c);
       ++part.cells;
-      part.still += cells.still.at(r, c) >= params.reabsorb_frames;
+      part.settled += settled(cells, r, c, params);
       part.expected += cells.expected.at(r, c) > kDoubted;
       const float area_m2 = cell_area_m2(cells, r, c);
       part.area_m2 += area_m2;
@@ -173,7 +202,7 @@ void gather_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory
         part.contradicts_m2 += contradiction * area_m2;
       }
       const CellResidual& residual = cells.residual.at(r, c);
-      if (residual.weight > 0.0f) {
+      if (residual.terms.depth_weight > 0.0f) {
         float sum[kTerms] = {};
         add_point(residual.terms, residual.arm, 1.0f, 1.0f, sum);
         for (int32_t t = 0; t < kTerms; ++t) part.motion.sum[t] += static_cast<double>(sum[t]);
@@ -222,21 +251,20 @@ double quadratic(const double a[21], const double x[6]) {
   return sum;
 }
 
-/// Median over the area of how far parts lie off, in units of what they may.
-float usual_offset(int32_t parts, const PartMemory& memory, const MaskParams& params);
-
-double may_move_m(const Part& part, const MaskParams& params) {
-  return static_cast<double>(params.moved_m + params.moved_sigmas * part.noise_m);
+/// Enough of it is known for a motion of its own.
+bool votes(const Part& part) {
+  return part.motion.sum[kPoints] >= kMinPoints;
 }
 
+/// Median over the area of how far parts lie off, in units of what they may.
 float usual_offset(int32_t parts, const PartMemory& memory, const MaskParams& params) {
   constexpr int32_t kBins = 64;
   constexpr double kBinsPerUnit = 16.0;
   double area[kBins] = {}, all = 0;
   for (int32_t i = 0; i < parts; ++i) {
     const Part& part = memory.parts[static_cast<uint32_t>(i)];
-    if (part.motion.sum[kPoints] < kMinPoints) continue;
-    const double off = static_cast<double>(part.moved_m) / may_move_m(part, params);
+    if (!votes(part)) continue;
+    const double off = static_cast<double>(part.moved_m / may_move_m(part, params));
     area[std::min(kBins - 1, static_cast<int32_t>(off * kBinsPerUnit))] += static_cast<double>(part.area_m2);
     all += static_cast<double>(part.area_m2);
   }
@@ -249,8 +277,9 @@ float usual_offset(int32_t parts, const PartMemory& memory, const MaskParams& pa
 }
 
 bool has_moved(const Part& part, const MaskParams& params, float usual) {
-  return params.moved_m > 0.0f && part.area_m2 >= params.moved_m2 &&
-         static_cast<double>(part.moved_m) > may_move_m(part, params) * static_cast<double>(usual);
+  const bool near = part.motion.sum[kPoints] > kNearShare * part.cells;
+  return params.moved_m > 0.0f && part.area_m2 >= params.moved_m2 && near &&
+         part.moved_m > may_move_m(part, params) * usual;
 }
 
 /// Share of the area that follows another motion than most of it: with half or more nothing was agreed on.
@@ -270,15 +299,13 @@ Twistd agree_on_motion(int32_t parts, const PartMemory& memory, const MaskParams
   constexpr int32_t kRounds = 8;
   const float usual_before = usual;
   double motion[6] = {};
-  const auto vote = [&](const Part& part) { return part.motion.sum[kPoints] >= kMinPoints; };
   for (int32_t round = 0; round < kRounds; ++round) {
     double a[21] = {}, b[6] = {};
     for (int32_t i = 0; i < parts; ++i) {
       const Part& part = memory.parts[static_cast<uint32_t>(i)];
-      if (!vote(part)) continue;
+      if (!votes(part)) continue;
       // At first the area alone, then what follows another motion loses its say.
-      const double off =
-          static_cast<double>(part.moved_m) / (may_move_m(part, params) * static_cast<double>(usual_before));
+      const double off = static_cast<double>(part.moved_m / (may_move_m(part, params) * usual_before));
       const double trust = 1.0 / (1.0 + off * off);
       const double weight = static_cast<double>(part.area_m2) * trust * trust;
       const PartSystem system(part.motion);
@@ -288,7 +315,7 @@ Twistd agree_on_motion(int32_t parts, const PartMemory& memory, const MaskParams
     if (!solve(a, b, motion)) return {};
     for (int32_t i = 0; i < parts; ++i) {
       Part& part = memory.parts[static_cast<uint32_t>(i)];
-      if (!vote(part)) continue;
+      if (!votes(part)) continue;
       const PartSystem system(part.motion);
       double own[6];
       if (!solve(system.a, system.b, own)) continue;
@@ -300,34 +327,46 @@ Twistd agree_on_motion(int32_t parts, const PartMemory& memory, const MaskParams
   return {{motion[0], motion[1], motion[2]}, {motion[3], motion[4], motion[5]}};
 }
 
+namespace {
+
+/// What stands still is static, though it contradicts the map or lies off it: the map will learn it.
+void decide(Part& part, const MaskParams& params, float usual, bool believe_moves) {
+  const bool was = params.warp && 2 * part.expected > part.cells;
+  const bool hardly_known = part.known < kHardlyKnownShare * static_cast<float>(part.cells);
+  const float share = part.known > 0 ? part.contradicts / part.known : 0.0f;
+  const float limit = was && !hardly_known ? params.share_off : params.share_on;
+  const bool contradicts = part.contradicts_m2 >= params.blob_m2 && share > limit;
+  const bool stands = static_cast<float>(part.settled) > kSettledShare * static_cast<float>(part.cells);
+  part.moved = !stands && believe_moves && has_moved(part, params, usual * (was ? kWasMovingFactor : 1.0f));
+  part.dynamic = part.moved || (!stands && (contradicts || (was && hardly_known)));
+}
+
+}  // namespace
+
 void decide_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory, const MaskParams& params,
                   float usual) {
   std::fill_n(cells.dynamic.data, cells.dynamic.pixels(), uint8_t{0});
-  const bool believe_moves = moved_share(parts, memory, params, usual) < 0.5f;
+  const bool believe_moves = moved_share(parts, memory, params, usual) < kMostOfTheSpace;
   for (int32_t i = 0; i < parts; ++i) {
     Part& part = memory.parts[static_cast<uint32_t>(i)];
-    const bool was = params.warp && 2 * part.expected > part.cells;
-    const float share = part.known > 0 ? part.contradicts / part.known : 0.0f;
-    const bool hardly_known = part.known < 0.2f * static_cast<float>(part.cells);
-    part.moved = believe_moves && has_moved(part, params, usual * (was ? 0.7f : 1.0f));
-    const bool contradicts =
-        part.contradicts_m2 >= params.blob_m2 && share > (was ? params.share_off : params.share_on);
-    const bool settled = params.reabsorb_frames < 255 && 5 * part.still > 3 * part.cells;
-    part.dynamic = !settled && (part.moved || contradicts || (was && hardly_known));
+    decide(part, params, usual, believe_moves);
   }
-  for (int32_t i = 0; i < cells.part.pixels(); ++i) {
-    const int32_t number = cells.part.data[i];
-    if (number >= 0 && memory.parts[static_cast<uint32_t>(number)].dynamic) cells.dynamic.data[i] = kSet;
-  }
-  // A thing that was put down on another makes one part with it: what the map knows well stays static.
+  const auto part_of = [&](int32_t r, int32_t c) -> const Part& {
+    return memory.parts[static_cast<uint32_t>(cells.part.at(r, c))];
+  };
+  for (int32_t r = 0; r < cells.part.rows; ++r)
+    for (int32_t c = 0; c < cells.part.cols; ++c)
+      if (cells.part.at(r, c) >= 0 && part_of(r, c).dynamic) cells.dynamic.at(r, c) = kSet;
+  // A thing that was put down makes one part with what it stands on, or with who put it there: what the map
+  // knows well stays static, and so does what has settled.
   set_blobs(cells, memory, params.moved_m2, 0, [&](int32_t r, int32_t c) {
-    const int32_t number = cells.part.at(r, c);
-    if (number < 0 || !cells.dynamic.at(r, c) || memory.parts[static_cast<uint32_t>(number)].moved)
-      return false;
-    return cells.evidence.at(r, c) >= 0.0f && cells.evidence.at(r, c) < 0.5f;
+    if (cells.part.at(r, c) < 0 || !cells.dynamic.at(r, c)) return false;
+    const Contradiction evidence = cells.evidence.at(r, c);
+    return !part_of(r, c).moved &&
+           ((evidence >= 0.0f && evidence < kContradicts) || settled(cells, r, c, params));
   });
   set_blobs(cells, memory, params.blob_m2, kSet, [&](int32_t r, int32_t c) {
-    return cells.evidence.at(r, c) >= 1.0f && cells.still.at(r, c) < params.reabsorb_frames;
+    return cells.evidence.at(r, c) >= 1.0f && !settled(cells, r, c, params);
   });
   grow(cells, memory, params.grow_m);
 }
@@ -335,19 +374,19 @@ void decide_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory
 void carry_mask(const ImageView<const float>& depth_before_m, const ImageView<const uint8_t>& dynamic_before,
                 const Se3& T_now_before, const CellGrid& now) {
   std::fill_n(now.expected.data, now.expected.pixels(), uint8_t{0});
-  constexpr float kMoved_m = 0.15f;  // towards or away from the camera since the last frame
+  constexpr float kMovedM = 0.15f;  // towards or away from the camera since the last frame
   for (int32_t r = 0; r < depth_before_m.rows; ++r)
     for (int32_t c = 0; c < depth_before_m.cols; ++c) {
       const float z_m = depth_before_m.at(r, c);
       if (!dynamic_before.at(r, c) || z_m <= 0.0f) continue;
       const Vec3 p = T_now_before * unproject(now.k, static_cast<float>(c), static_cast<float>(r), z_m);
-      if (p.z <= 0.05f) continue;
+      if (p.z < kNearestM) continue;
       const Pixel at = project(now.k, p);
       const int32_t row = static_cast<int32_t>(std::floor(at.v)),
                     col = static_cast<int32_t>(std::floor(at.u));
       for (int32_t i = 0; i < 4; ++i) {  // the four cells around: no holes
         const int32_t nr = row + (i >> 1), nc = col + (i & 1);
-        if (now.depth_m.contains(nr, nc) && std::fabs(now.depth_m.at(nr, nc) - p.z) < kMoved_m)
+        if (now.depth_m.contains(nr, nc) && std::fabs(now.depth_m.at(nr, nc) - p.z) < kMovedM)
           now.expected.at(nr, nc) = std::max(now.expected.at(nr, nc), dynamic_before.at(r, c));
       }
     }

@@ -10,7 +10,9 @@ namespace stillmap {
 
 /// What is known of one connected part of the picture.
 struct Part {
-  int32_t cells = 0, expected = 0, still = 0;
+  int32_t cells = 0, expected = 0;
+  int32_t row0 = 0, row1 = 0, col0 = 0, col1 = 0;  ///< all its cells lie in here, ends excluded
+  int32_t settled = 0;                             ///< cells that stood still for mask.reabsorb_frames
   float known = 0, contradicts = 0;       ///< cells with a value in the map; sum of their contradiction
   float area_m2 = 0, contradicts_m2 = 0;  ///< as seen; of what contradicts
   float noise_m = 0;                      ///< mean of the cells' noise
@@ -34,8 +36,22 @@ struct PartMemory {
 int32_t segment(const CellGrid& cells, const PartMemory& memory, const MaskParams& params,
                 const DepthNoise& noise);
 
+/// Visits the cells of part number `i`.
+template <class F>
+void for_cells_of(const CellGrid& cells, int32_t i, const Part& part, const F& f) {
+  for (int32_t r = part.row0; r < part.row1; ++r)
+    for (int32_t c = part.col0; c < part.col1; ++c)
+      if (cells.part.at(r, c) == i) f(r, c);
+}
+
+/// How far the surface of a part may seem to lie off its place.
+inline float may_move_m(const Part& part, const MaskParams& params) {
+  return params.moved_m + params.moved_sigmas * part.noise_m;
+}
+
 /// Adds up evidence and least squares of each part.                    test: parts_test
-void gather_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory, const MaskParams& params);
+void gather_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory, const MaskParams& params,
+                  const DepthNoise& noise);
 
 /// The motion that most of the *space* agrees on: movers may fill the picture, but not the room. Parts that
 /// follow another motion lose their vote; fills Part::moved_m.           test: parts_test

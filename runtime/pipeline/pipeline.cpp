@@ -32,6 +32,16 @@ float probability_good(float inlier_ratio, const TrackParams& p) {
                     1.0f);
 }
 
+/// Probability that a pose with these errors is as near to the truth as a good one: within
+/// 5 cm and 3 degrees. Errors of all axes are taken to add up.
+float probability_within(const std::array<float, 6>& sigma) {
+  constexpr float kGoodM = 0.05f, kGoodRad = 0.0524f;
+  const auto inside = [](float limit, float x, float y, float z) {
+    return std::erf(limit / std::sqrt(2.0f * (x * x + y * y + z * z)));
+  };
+  return inside(kGoodM, sigma[0], sigma[1], sigma[2]) * inside(kGoodRad, sigma[3], sigma[4], sigma[5]);
+}
+
 /// What the engine is told about the pose to come.
 PosePrior prior_from(const PredictedPose& expected, const TrackParams& p) {
   PosePrior prior;
@@ -87,6 +97,8 @@ FrameResult Pipeline::process(const RgbdFrame& frame) {
     else
       result = lost_ && relocaliser_.enabled() ? find_again(result) : track_and_map(result);
     if (result.state == TrackingState::good) relocaliser_.remember(result.T_map_cam);
+  } else if (!lost_) {
+    result = go_on_blind(result);
   }
   result.map = engine_.map_health();
   result.ms.total_ms = total.total_ms();
@@ -133,6 +145,16 @@ FrameResult Pipeline::track_and_map(FrameResult result) {
   if (result.state == TrackingState::good)
     engine_.integrate(refined.T_world_cam);  // a poor pose freezes the map
   result.ms.integrate_ms = watch.lap_ms();
+  return result;
+}
+
+/// Without a usable frame the pose is the one that the motion so far leads to expect, while that is sure.
+FrameResult Pipeline::go_on_blind(FrameResult result) {
+  constexpr float kSure = 0.9f;
+  const PredictedPose expected = predictor_.predict(result.stamp);
+  result.T_map_cam = expected.T_map_cam;
+  result.p_good = probability_within(expected.sigma);
+  result.state = result.p_good >= kSure ? TrackingState::poor : TrackingState::lost;
   return result;
 }
 

@@ -24,7 +24,8 @@ struct StageTimes {
 struct FrameResult {
   Stamp stamp;  ///< depth capture
   uint32_t sequence = 0;
-  Status status = Status::ok;  ///< bad_data: frame not used (too few valid pixels); pose and map unchanged
+  Status status =
+      Status::ok;  ///< bad_data: frame not used (too few valid pixels); pose predicted, map unchanged
   TrackingState state = TrackingState::good;
   float p_good = 0;  ///< probability that the pose is good, 0..1
   float inlier_ratio = 0;
@@ -59,6 +60,7 @@ class Pipeline {
   FrameResult start_map(FrameResult result);
   FrameResult track_and_map(FrameResult result);
   FrameResult find_again(FrameResult result);
+  FrameResult go_on_blind(FrameResult result);
   bool blind_too_long(Stamp stamp) const;
   void remember(const FrameResult& result);
 

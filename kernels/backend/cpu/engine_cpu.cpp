@@ -14,6 +14,7 @@
 #include "kernels/engine.hpp"
 #include "kernels/mask/grow_mask.hpp"
 #include "kernels/mask/parts.hpp"
+#include "kernels/mask/slide.hpp"
 #include "kernels/track/track.hpp"
 
 namespace stillmap {
@@ -22,6 +23,8 @@ namespace {
 constexpr int32_t kRowsPerTile = 16;  ///< of the finest level; a multiple of the coarsest step
 constexpr uint32_t kGroupsPerTile = 16;
 constexpr uint32_t kBlocksPerTile = 32;
+constexpr int32_t kEarlier =
+    4;  ///< frames kept to see what slides; the oldest is mask.reabsorb_frames old, or a third more
 
 /// A length or count of 640x480 pixels, scaled to the image.
 int32_t scaled_px(int32_t px_at_640, int32_t width) {
@@ -74,6 +77,7 @@ struct CpuMemory {
   ImageView<uint8_t> trust;
   CellGrid cells;
   CellsBefore before;
+  EarlierCells earlier[kEarlier];
   PartMemory part_memory;
   DepthRangePyramid ranges;
   View<NormalEqT<float>> track_tiles;
@@ -129,6 +133,10 @@ struct CpuMemory {
     before.crept_m = arena.take_image<float>("parts", rows, cols);
     before.dynamic = arena.take_image<uint8_t>("parts", rows, cols);
     before.still = arena.take_image<uint8_t>("parts", rows, cols);
+    for (EarlierCells& e : earlier) {
+      e.depth_m = arena.take_image<float>("parts", rows, cols);
+      e.luma = arena.take_image<float>("parts", rows, cols);
+    }
     const uint64_t count = static_cast<uint64_t>(rows) * static_cast<uint64_t>(cols);
     part_memory.parts = arena.take<Part>("parts", count);
     part_memory.queue = arena.take<int32_t>("parts", count);
@@ -192,6 +200,7 @@ class CpuEngine final : public Engine {
   void reset_map() override {
     memory_.map.clear();
     memory_.relocaliser.clear();
+    forget_cells();
   }
 
  private:
@@ -201,9 +210,13 @@ class CpuEngine final : public Engine {
   TrackPass track_pass(const Se3& T_map_cam) const;
   TrackResult register_to_map(const Se3& T_start, ImageView<const uint8_t> trust, LevelRange levels,
                               const PosePrior& prior);
+  uint32_t masks_between_earlier() const {
+    return static_cast<uint32_t>(std::max(1, params_.mask.reabsorb_frames / (kEarlier - 1)));
+  }
   bool by_parts() const { return params_.mask.enabled && params_.mask.method == MaskMethod::parts; }
   void make_cells();
-  void remember_cells();
+  void remember_cells(const Se3& T_map_cam);
+  void forget_cells();
   void mask_by_residual(const Se3& T_map_cam);
   void mask_by_parts(const Se3& T_map_cam);
   void write_static_pixels(bool masked);
@@ -226,7 +239,8 @@ class CpuEngine final : public Engine {
   ThreadPool pool_;
   int32_t frames_ = 0;  ///< integrated, modulo 2^16
   float usual_ = 1.0f;
-  Se3 T_before_;  ///< pose of the last mask
+  Se3 T_before_;        ///< pose of the last mask
+  uint32_t masks_ = 0;  ///< masks made since the map was empty
 };
 
 void CpuEngine::fill_source_pixels() {
@@ -321,16 +335,21 @@ void CpuEngine::write_static_pixels(bool masked) {
                        memory_.depth_m,
                        masked ? memory_.mask : ImageView<uint8_t>{},
                        memory_.trust,
-                       {params_.depth.noise_m, params_.depth.noise_per_m2},
+                       depth_noise(params_.depth),
                        params_.track.trust_noise_m,
-                       params_.track.trust_area_m,
-                       0.1f};
+                       params_.track.trust_area_m};
   in_row_tiles(k().height, [&](int32_t first, int32_t last) { loops_.static_pixels(pass, first, last); });
+}
+
+/// The pose of the camera after an increment about its centre (see TrackPass).
+Se3 moved_about_centre(const Se3& T_map_cam, const Twistd& motion) {
+  const Se3d T = cast<double>(T_map_cam), turn = exp(Twistd{{}, motion.w});
+  return cast<float>(Se3d{orthonormalized(turn.rotation * T.rotation), T.translation + motion.v});
 }
 
 void CpuEngine::mask_by_parts(const Se3& T_map_cam) {
   const CellGrid& cells = memory_.cells;
-  const DepthNoise noise{params_.depth.noise_m, params_.depth.noise_per_m2};
+  const DepthNoise noise = depth_noise(params_.depth);
   TrackPass track = track_pass(T_map_cam);
   track.k = cells.k;
   set_kernel(params_, 2, track.weights);
@@ -342,25 +361,49 @@ void CpuEngine::mask_by_parts(const Se3& T_map_cam) {
   in_row_tiles(cells.depth_m.rows,
                [&](int32_t first, int32_t last) { loops_.still_cells(still, first, last); });
   const int32_t parts = segment(cells, memory_.part_memory, params_.mask, noise);
-  gather_parts(cells, parts, memory_.part_memory, params_.mask);
-  agree_on_motion(parts, memory_.part_memory, params_.mask, usual_);
+  gather_parts(cells, parts, memory_.part_memory, params_.mask, noise);
+  const Twistd motion = agree_on_motion(parts, memory_.part_memory, params_.mask, usual_);
+  const Se3 T_agreed = moved_about_centre(T_map_cam, motion);
+  // Two of them: who swings back to where it was then was elsewhere in between.
+  for (const uint32_t later : {1u, 2u}) {
+    const EarlierCells& earlier = memory_.earlier[(masks_ / masks_between_earlier() + later) % kEarlier];
+    restart_sliding(cells, parts, memory_.part_memory, params_.mask, noise, earlier,
+                    inverse(earlier.T_map_cam) * T_agreed);
+  }
   decide_parts(cells, parts, memory_.part_memory, params_.mask, usual_);
   write_static_pixels(true);
-  remember_cells();
-  T_before_ = T_map_cam;
+  remember_cells(T_map_cam);
 }
 
-void CpuEngine::remember_cells() {
+void CpuEngine::remember_cells(const Se3& T_map_cam) {
   const CellGrid& now = memory_.cells;
   const CellsBefore& before = memory_.before;
   std::copy_n(now.depth_m.data, now.depth_m.pixels(), before.depth_m.data);
   std::copy_n(now.luma.data, now.luma.pixels(), before.luma.data);
   std::copy_n(now.crept_m.data, now.crept_m.pixels(), before.crept_m.data);
   for (int32_t i = 0; i < now.dynamic.pixels(); ++i)
-    before.dynamic.data[i] = now.dynamic.data[i]            ? kMasked
-                             : now.evidence.data[i] >= 0.5f ? kDoubted
-                                                            : uint8_t{0};
+    before.dynamic.data[i] = now.dynamic.data[i]             ? kMasked
+                             : doubted(now.evidence.data[i]) ? kDoubted
+                                                             : uint8_t{0};
   std::copy_n(now.still.data, now.still.pixels(), before.still.data);
+  T_before_ = T_map_cam;
+  if (masks_++ % masks_between_earlier() != 0) return;
+  EarlierCells& earlier = memory_.earlier[(masks_ - 1) / masks_between_earlier() % kEarlier];
+  std::copy_n(now.depth_m.data, now.depth_m.pixels(), earlier.depth_m.data);
+  std::copy_n(now.luma.data, now.luma.pixels(), earlier.luma.data);
+  earlier.T_map_cam = T_map_cam;
+}
+
+void CpuEngine::forget_cells() {
+  const CellsBefore& before = memory_.before;
+  std::fill_n(before.depth_m.data, before.depth_m.pixels(), 0.0f);
+  std::fill_n(before.dynamic.data, before.dynamic.pixels(), uint8_t{0});
+  std::fill_n(before.still.data, before.still.pixels(), uint8_t{0});
+  for (const EarlierCells& earlier : memory_.earlier)
+    std::fill_n(earlier.depth_m.data, earlier.depth_m.pixels(), 0.0f);
+  masks_ = 0;
+  usual_ = 1.0f;
+  T_before_ = {};
 }
 
 TrackResult CpuEngine::register_to_map(const Se3& T_start, ImageView<const uint8_t> trust, LevelRange levels,

@@ -155,29 +155,51 @@ TEST_F(PipelineTest, WithoutAMaskAConvergedRegistrationIsNotRepeated) {
   EXPECT_EQ(engine_.calls, "ptmri");
 }
 
-TEST_F(PipelineTest, ABadFrameIsCountedAndMovesNothing) {
+TEST_F(PipelineTest, ABadFrameIsCountedAndTouchesNothing) {
   config_.track.prior = MotionPrior::last_pose;
   Pipeline pipeline(engine_, config_);
   engine_.prepare_status = Status::bad_data;
-  EXPECT_EQ(process(pipeline, 0).status, Status::bad_data);  // also as the first: the next is the map
+  const FrameResult first = process(pipeline, 0);  // the next is the map
+  EXPECT_EQ(first.status, Status::bad_data);
+  EXPECT_EQ(first.state, TrackingState::lost);
   EXPECT_EQ(engine_.calls, "p");
   engine_.prepare_status = Status::ok;
   process(pipeline, 33);
   EXPECT_EQ(engine_.calls, "pi");
-  answer(at(0.1f));
+  answer(at(0.01f));
   process(pipeline, 66);
   engine_.prepare_status = Status::bad_data;
   const FrameResult bad = process(pipeline, 100);
   EXPECT_EQ(engine_.calls, "p");
   EXPECT_EQ(bad.status, Status::bad_data);
-  EXPECT_NEAR(bad.T_map_cam.translation.x, 0.1, 1e-6);
-  EXPECT_EQ(bad.state, TrackingState::good);
+  EXPECT_NEAR(bad.T_map_cam.translation.x, 0.01, 1e-6);
+  EXPECT_EQ(bad.state, TrackingState::poor);
   engine_.prepare_status = Status::ok;
   process(pipeline, 133);
-  EXPECT_EQ(engine_.track_start.translation.x, 0.1f);
+  EXPECT_EQ(engine_.track_start.translation.x, 0.01f);
   EXPECT_EQ(pipeline.counters().frames, 5u);
   EXPECT_EQ(pipeline.counters().bad_frames, 2u);
-  EXPECT_EQ(pipeline.counters().lost_frames, 0u);
+  EXPECT_EQ(pipeline.counters().lost_frames, 1u);
+}
+
+TEST_F(PipelineTest, WithoutAFrameTheMotionGoesOnUntilItIsUnsure) {
+  config_.track.prior = MotionPrior::constant_velocity;
+  Pipeline pipeline(engine_, config_);
+  for (int i = 0; i <= 30; ++i) {
+    answer(at(0.01f * static_cast<float>(i)));
+    process(pipeline, 33 * i);
+  }
+  engine_.prepare_status = Status::bad_data;
+  const FrameResult soon = process(pipeline, 31 * 33);
+  EXPECT_EQ(soon.state, TrackingState::poor);
+  EXPECT_NEAR(soon.T_map_cam.translation.x, 0.31, 0.003);
+  EXPECT_GT(soon.p_good, 0.99f);
+  const FrameResult late = process(pipeline, 38 * 33);  // 0.27 s without a frame: 3 cm too far, or 5
+  EXPECT_EQ(late.state, TrackingState::lost);
+  EXPECT_LT(late.p_good, soon.p_good);
+  engine_.prepare_status = Status::ok;
+  answer(at(0.32f));
+  EXPECT_EQ(process(pipeline, 39 * 33).state, TrackingState::lost);  // it is looked for
 }
 
 TEST_F(PipelineTest, APoorPoseFreezesTheMap) {
@@ -246,16 +268,16 @@ TEST_F(PipelineTest, WithoutRelocalisationALostCameraIsTrackedOn) {
 TEST_F(PipelineTest, ALongStretchWithoutAUsableFrameIsALoss) {
   Pipeline pipeline(engine_, config_);
   process(pipeline, 0);
-  answer(at(0.1f));
+  answer(at(0.001f));
   process(pipeline, 33);
   process(pipeline, 66);
   engine_.prepare_status = Status::bad_data;
-  EXPECT_EQ(process(pipeline, 200).state, TrackingState::good);  // relocalise.blind_s is 0.2
+  EXPECT_EQ(process(pipeline, 200).state, TrackingState::poor);  // relocalise.blind_s is 0.2
   EXPECT_EQ(process(pipeline, 300).state, TrackingState::lost);
   engine_.prepare_status = Status::ok;
   EXPECT_EQ(process(pipeline, 333).state, TrackingState::lost);
   EXPECT_EQ(engine_.calls, "pf");
-  EXPECT_EQ(engine_.find_guess.translation.x, 0.1f);  // the last pose is tried
+  EXPECT_EQ(engine_.find_guess.translation.x, 0.001f);  // the last pose is tried
   EXPECT_EQ(pipeline.counters().lost_frames, 2u);
   EXPECT_EQ(pipeline.counters().bad_frames, 2u);
 }

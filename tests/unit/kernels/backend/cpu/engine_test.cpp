@@ -216,26 +216,89 @@ TEST(CpuEngine, ABoxInFreeSpaceIsMaskedExactly) {
   EXPECT_EQ(result.masked_valid_pixels, boxed);
 }
 
-TEST(CpuEngine, TheWallStaysWhenTheBoxHasGoneThrough) {
-  Rig rig(paper_params());
+TEST(CpuEngine, ByPartsTheMaskIsTheBoxButForItsRim) {
+  Rig rig(small_params());
   const Intrinsics k = corner_camera(kWidth);
-  const CornerView empty({}, k, {});
-  rig.add(empty, {}, 5);
-  const MeshRecorder before = rig.mesh();
-  for (int n = 0; n < 10; ++n) {
-    CornerScene scene = with_box();
-    scene.box->low.x += 0.03 * n;
-    scene.box->high.x += 0.03 * n;
-    rig.mask(CornerView(scene, k, {}));
+  rig.add(CornerView({}, k, {}), {}, 3);
+  const CornerView view(with_box(), k, {});
+  rig.mask(view);
+  test::TestImage<uint8_t> grown(k.height, k.width), scratch(k.height, k.width);
+  std::copy(view.on_box.begin(), view.on_box.end(), grown.view().data);
+  constexpr int32_t kRimPx = 3;
+  dilate_rows(grown.view(), scratch.view(), kRimPx, 0, k.height);
+  dilate_columns(scratch.view(), grown.view(), kRimPx, 0, k.width);
+  int32_t missed = 0, beyond = 0;
+  for (int32_t r = 0; r < k.height; ++r)
+    for (int32_t c = 0; c < k.width; ++c) {
+      const bool masked = rig.engine->mask_image().at(r, c) != 0;
+      missed += !masked && view.on_box[static_cast<size_t>(r * k.width + c)] != 0;
+      beyond += masked && !grown.view().at(r, c);
+    }
+  EXPECT_EQ(missed, 0);
+  EXPECT_EQ(beyond, 0);
+}
+
+/// Frames of a box that came and stays, until the mask lets go of it.
+int32_t frames_until_static(Rig& rig, const CornerView& view, int32_t at_most) {
+  for (int32_t n = 0; n < at_most; ++n) {
+    if (rig.mask(view).masked_pixels == 0) return n;
     rig.engine->integrate({});
   }
-  rig.add(empty, {}, 1);
-  for (const Vec3& p : rig.mesh().positions) {
-    const Vec3d at = {static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z)};
-    ASSERT_LT(std::fabs(CornerScene{}.sdf_m(at)), 0.02);
+  return at_most;
+}
+
+TEST(CpuEngine, ABoxThatCameAndStaysIsStaticAndMapped) {
+  EngineParams p = small_params();
+  p.mask.reabsorb_frames = 9;
+  Rig rig(p);
+  const Intrinsics k = corner_camera(kWidth);
+  rig.add(CornerView({}, k, {}), {}, 20);
+  const CornerView view(with_box(), k, {});
+  EXPECT_EQ(frames_until_static(rig, view, 40), 9);
+  for (int n = 0; n < 8; ++n) {  // and it does not fall back
+    EXPECT_EQ(rig.mask(view).masked_pixels, 0) << n;
+    rig.engine->integrate({});
   }
-  EXPECT_NEAR(static_cast<double>(rig.mesh().positions.size()), static_cast<double>(before.positions.size()),
-              0.01 * static_cast<double>(before.positions.size()));
+  const std::vector<float> depth = rig.depth_of_map(k);
+  EXPECT_NEAR(depth[static_cast<size_t>(k.height / 2 * k.width + k.width / 2)], 1.0f, 0.01f);
+}
+
+TEST(CpuEngine, AMapThatWasForgottenHasNoPastEither) {
+  EngineParams p = small_params();
+  p.mask.reabsorb_frames = 9;
+  Rig rig(p);
+  const Intrinsics k = corner_camera(kWidth);
+  const CornerView empty({}, k, {}), view(with_box(), k, {});
+  rig.add(empty, {}, 3);
+  for (int n = 0; n < 8; ++n) rig.mask(view);
+  rig.engine->reset_map();
+  rig.add(empty, {}, 3);
+  EXPECT_EQ(frames_until_static(rig, view, 40), 9);  // the eight frames before do not count
+}
+
+TEST(CpuEngine, TheWallStaysWhenTheBoxHasGoneThrough) {
+  for (const EngineParams& params : {paper_params(), small_params()}) {
+    Rig rig(params);
+    const Intrinsics k = corner_camera(kWidth);
+    const CornerView empty({}, k, {});
+    rig.add(empty, {}, 5);
+    const MeshRecorder before = rig.mesh();
+    for (int n = 0; n < 10; ++n) {
+      CornerScene scene = with_box();
+      scene.box->low.x += 0.03 * n;
+      scene.box->high.x += 0.03 * n;
+      rig.mask(CornerView(scene, k, {}));
+      rig.engine->integrate({});
+    }
+    rig.add(empty, {}, 1);
+    for (const Vec3& p : rig.mesh().positions) {
+      const Vec3d at = {static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z)};
+      ASSERT_LT(std::fabs(CornerScene{}.sdf_m(at)), 0.02);
+    }
+    EXPECT_NEAR(static_cast<double>(rig.mesh().positions.size()),
+                static_cast<double>(before.positions.size()),
+                0.01 * static_cast<double>(before.positions.size()));
+  }
 }
 
 TEST(CpuEngine, WhatIsMaskedDoesNotChangeTheMap) {
@@ -384,8 +447,7 @@ struct Trace {
   MeshRecorder mesh;
   MapHealth health;
 
-  explicit Trace(int32_t threads) {
-    EngineParams p = paper_params();
+  Trace(EngineParams p, int32_t threads) {
     p.threads = threads;
     Rig rig(p);
     const Intrinsics k = corner_camera(kWidth);
@@ -412,23 +474,25 @@ struct Trace {
 };
 
 TEST(CpuEngine, TheSameBitsWithOneTwoAndFourThreads) {
-  const Trace one(1);
-  EXPECT_GT(one.mesh.triangle_count(), 1000u);
-  EXPECT_GT(std::count(one.masks.begin(), one.masks.end(), 255), 1000);
-  for (const int32_t threads : {2, 4}) {
-    const Trace many(threads);
-    ASSERT_EQ(one.tracks.size(), many.tracks.size());
-    for (size_t i = 0; i < one.tracks.size(); ++i) {
-      const TrackResult &a = one.tracks[i], &b = many.tracks[i];
-      EXPECT_TRUE(same_bytes(a.T_world_cam, b.T_world_cam)) << threads << " threads, registration " << i;
-      EXPECT_EQ(std::memcmp(a.covariance, b.covariance, sizeof a.covariance), 0);
-      EXPECT_EQ(a.inlier_ratio, b.inlier_ratio);
-      EXPECT_EQ(a.rmse_m, b.rmse_m);
+  for (const EngineParams& params : {paper_params(), small_params()}) {
+    const Trace one(params, 1);
+    EXPECT_GT(one.mesh.triangle_count(), 1000u);
+    EXPECT_GT(std::count(one.masks.begin(), one.masks.end(), 255), 1000);
+    for (const int32_t threads : {2, 4}) {
+      const Trace many(params, threads);
+      ASSERT_EQ(one.tracks.size(), many.tracks.size());
+      for (size_t i = 0; i < one.tracks.size(); ++i) {
+        const TrackResult &a = one.tracks[i], &b = many.tracks[i];
+        EXPECT_TRUE(same_bytes(a.T_world_cam, b.T_world_cam)) << threads << " threads, registration " << i;
+        EXPECT_EQ(std::memcmp(a.covariance, b.covariance, sizeof a.covariance), 0);
+        EXPECT_EQ(a.inlier_ratio, b.inlier_ratio);
+        EXPECT_EQ(a.rmse_m, b.rmse_m);
+      }
+      EXPECT_TRUE(same_bytes(one.masks, many.masks));
+      EXPECT_TRUE(same_bytes(one.depth, many.depth));
+      EXPECT_TRUE(same_mesh(one.mesh, many.mesh));
+      EXPECT_EQ(one.health.blocks, many.health.blocks);
     }
-    EXPECT_TRUE(same_bytes(one.masks, many.masks));
-    EXPECT_TRUE(same_bytes(one.depth, many.depth));
-    EXPECT_TRUE(same_mesh(one.mesh, many.mesh));
-    EXPECT_EQ(one.health.blocks, many.health.blocks);
   }
 }
 
