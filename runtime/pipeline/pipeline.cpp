@@ -24,22 +24,9 @@ class StopWatch {
   Clock::time_point start_ = Clock::now(), last_ = start_;
 };
 
-/// Share of inliers between `lost` and all, as a probability: 0 at the lost threshold, 1 at twice the poor
-/// one.
-float probability_good(float inlier_ratio, const TrackParams& p) {
-  const float full = std::min(1.0f, 2.0f * p.poor_inlier_ratio);
-  return std::clamp((inlier_ratio - p.lost_inlier_ratio) / std::max(full - p.lost_inlier_ratio, 1e-3f), 0.0f,
-                    1.0f);
-}
-
-/// Probability that a pose with these errors is as near to the truth as a good one: within
-/// 5 cm and 3 degrees. Errors of all axes are taken to add up.
-float probability_within(const std::array<float, 6>& sigma) {
-  constexpr float kGoodM = 0.05f, kGoodRad = 0.0524f;
-  const auto inside = [](float limit, float x, float y, float z) {
-    return std::erf(limit / std::sqrt(2.0f * (x * x + y * y + z * z)));
-  };
-  return inside(kGoodM, sigma[0], sigma[1], sigma[2]) * inside(kGoodRad, sigma[3], sigma[4], sigma[5]);
+void set_quality(FrameResult& result, const PoseQuality& quality) {
+  result.state = quality.state;
+  result.p_good = quality.p_good;
 }
 
 /// What the engine is told about the pose to come.
@@ -53,24 +40,7 @@ PosePrior prior_from(const PredictedPose& expected, const TrackParams& p) {
   return prior;
 }
 
-TrackingState state_of(const TrackResult& track, const TrackParams& p) {
-  if (track.status != Status::ok || track.inlier_ratio < p.lost_inlier_ratio) return TrackingState::lost;
-  return track.inlier_ratio < p.poor_inlier_ratio ? TrackingState::poor : TrackingState::good;
-}
-
 }  // namespace
-
-const char* to_string(TrackingState state) {
-  switch (state) {
-    case TrackingState::good:
-      return "good";
-    case TrackingState::poor:
-      return "poor";
-    case TrackingState::lost:
-      return "lost";
-  }
-  return "unknown";
-}
 
 Pipeline::Pipeline(Engine& engine, const Config& config, const Se3d& T_map_cam, OdometryPort* odometry)
     : engine_(engine),
@@ -135,8 +105,7 @@ FrameResult Pipeline::track_and_map(FrameResult result) {
 
   const int32_t pixels = engine_.mask_image().pixels();
   result.masked_fraction = static_cast<float>(mask.masked_pixels) / static_cast<float>(pixels);
-  result.state = state_of(refined, config_.track);
-  result.p_good = probability_good(refined.inlier_ratio, config_.track);
+  set_quality(result, quality_of(refined, prior.T_world_cam, config_.track));
   result.inlier_ratio = refined.inlier_ratio;
   if (refined.status == Status::ok) {
     std::copy_n(refined.covariance, 21, result.covariance);
@@ -150,11 +119,9 @@ FrameResult Pipeline::track_and_map(FrameResult result) {
 
 /// Without a usable frame the pose is the one that the motion so far leads to expect, while that is sure.
 FrameResult Pipeline::go_on_blind(FrameResult result) {
-  constexpr float kSure = 0.9f;
   const PredictedPose expected = predictor_.predict(result.stamp);
   result.T_map_cam = expected.T_map_cam;
-  result.p_good = probability_within(expected.sigma);
-  result.state = result.p_good >= kSure ? TrackingState::poor : TrackingState::lost;
+  set_quality(result, quality_of_prediction(expected.sigma));
   return result;
 }
 

@@ -7,13 +7,11 @@
 #include "config/config.hpp"
 #include "kernels/engine.hpp"
 #include "runtime/pipeline/motion_predictor.hpp"
+#include "runtime/pipeline/pose_quality.hpp"
 #include "runtime/pipeline/relocaliser.hpp"
 #include "runtime/ports/frame_source.hpp"
 
 namespace stillmap {
-
-enum class TrackingState : uint8_t { good, poor, lost };
-const char* to_string(TrackingState state);
 
 /// Wall time of the steps of one frame. `total`: frame ready to result ready, decoding excluded.
 struct StageTimes {
