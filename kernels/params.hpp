@@ -227,6 +227,7 @@ struct MapParams {
   int32_t pool_blocks = 110000;
   float high_water = 0.98f;
   int32_t mesh_min_weight = 3;
+  int32_t mesh_min_surface = 10;
 
   template <class F>
   static void fields(F&& f) {
@@ -239,6 +240,8 @@ struct MapParams {
       "above this fill the blocks farthest from the camera are dropped");
     f("mesh_min_weight", &P::mesh_min_weight, 1, 255, "observations", "ours",
       "voxels seen less often do not make a mesh");
+    f("mesh_min_surface", &P::mesh_min_surface, 0, 64, "observations", "ours",
+      "nor do those on whose surface fewer measurements lay: what came into view is on probation");
   }
 };
 

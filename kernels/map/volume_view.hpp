@@ -18,7 +18,8 @@ struct VolumeView {
                                ///< changes nothing
   float voxel_m = 0.01f;
   float truncation_m = 0.1f;
-  int32_t mesh_min_weight = 1;  ///< voxels observed less often do not make a mesh, at least 1
+  int32_t mesh_min_weight = 1;   ///< voxels observed less often do not make a mesh, at least 1
+  int32_t mesh_min_surface = 0;  ///< nor do those on whose surface fewer measurements lay
 
   STILLMAP_HD float sdf_unit_m() const { return truncation_m / static_cast<float>(kSdfMax); }
 };

@@ -29,6 +29,7 @@ void MapStorage::carve(Arena& arena, const MapParams& params) {
   view_.voxel_m = params.voxel_m;
   view_.truncation_m = params.truncation_m;
   view_.mesh_min_weight = params.mesh_min_weight;
+  view_.mesh_min_surface = params.mesh_min_surface;
   view_.table.keys = arena.take<BlockKey>("map: block table", slots);
   view_.table.blocks = arena.take<BlockId>("map: block table", slots);
   view_.blocks = arena.take<VoxelBlock>("map: voxel blocks", blocks);

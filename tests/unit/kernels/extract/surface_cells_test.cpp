@@ -136,6 +136,12 @@ TEST(SurfaceCells, VoxelsSeenTooSeldomDoNotCount) {
   EXPECT_EQ(active_cells(), 49u);  // 7x7 cells lie across the plane, all corners in this block
   view.mesh_min_weight = 4;
   EXPECT_EQ(active_cells(), 0u);
+
+  view.mesh_min_weight = 3;
+  view.mesh_min_surface = 2;  // the voxels were free when they were seen
+  EXPECT_EQ(active_cells(), 0u);
+  for (VoxelRecord& r : map.block({0, 0, 0})->record) r.colour_weight = 2;
+  EXPECT_EQ(active_cells(), 49u);
 }
 
 TEST(CountBits, Counts) {

@@ -27,6 +27,7 @@ EngineParams small_params() {
   p.map.truncation_m = 0.1f;
   p.map.pool_blocks = 12000;
   p.map.mesh_min_weight = 1;
+  p.map.mesh_min_surface = 0;
   p.threads = 1;
   return p;
 }
