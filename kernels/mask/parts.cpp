@@ -14,8 +14,7 @@ constexpr float kSettledShare = 0.6f;      ///< of a part that stands still: the
 constexpr float kHardlyKnownShare = 0.2f;  ///< of a part: the map knows too little to say what it is
 constexpr double kNearShare =
     0.5;  ///< of a part must lie near a mapped surface, that it can have moved from it
-constexpr float kWasMovingFactor = 0.7f;  ///< hysteresis: what moved is asked for less
-constexpr float kMostOfTheSpace = 0.5f;   ///< with more of it on the move nothing was agreed on
+constexpr float kMostOfTheSpace = 0.5f;  ///< with more of it on the move nothing was agreed on
 
 bool has_normal(Vec3 n) {
   return dot(n, n) > 0.5f;
@@ -337,7 +336,7 @@ void decide(Part& part, const MaskParams& params, float usual, bool believe_move
   const float limit = was && !hardly_known ? params.share_off : params.share_on;
   const bool contradicts = part.contradicts_m2 >= params.blob_m2 && share > limit;
   const bool stands = static_cast<float>(part.settled) > kSettledShare * static_cast<float>(part.cells);
-  part.moved = !stands && believe_moves && has_moved(part, params, usual * (was ? kWasMovingFactor : 1.0f));
+  part.moved = !stands && believe_moves && has_moved(part, params, usual);
   part.dynamic = part.moved || (!stands && (contradicts || (was && hardly_known)));
 }
 
