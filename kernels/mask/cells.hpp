@@ -20,23 +20,16 @@ STILLMAP_HD int32_t cell_px_for(int32_t image_cols) {
   return px < 1 ? 1 : px;
 }
 
-/// What the map says about a cell: 0 near the mapped surface, 1 well before it in space that was seen free,
-/// between them doubt.
+/// What the map says about a cell: 0 near the mapped surface, 1 well away from it (in space that was seen
+/// free, or behind a surface by less than tau), between them doubt.
 using Contradiction = float;
 constexpr Contradiction kUnknown = -1.0f;  ///< no measurement, or nothing was ever observed there
-/// Well behind a mapped surface: that one is gone, which says nothing of what is seen in its stead.
-constexpr Contradiction kBehind = -2.0f;
 
 /// Of an expected mask: static, but not what the map says; no help to tracking.
 constexpr uint8_t kDoubted = 1;
 
 /// From here on a cell counts as contradicting the map.
 constexpr Contradiction kContradicts = 0.5f;
-
-/// Tracking gets no help from it.
-STILLMAP_HD bool doubted(Contradiction c) {
-  return c >= kContradicts || c == kBehind;
-}
 
 /// A frame that shows another brightness takes back so many of the frames that a cell stood still: noise
 /// alone does it now and then.
@@ -183,8 +176,8 @@ struct CellEvidencePass {
       residual.arm = point.arm;
       const float limit_m =
           fminf(contradict_m + contradict_sigmas * noise.at(z_m), 0.9f * track.map.truncation_m);
-      const float off = residual.terms.depth_residual_m / limit_m;
-      contradiction = off < -1.0f ? kBehind : fminf(fmaxf(2.0f * (off - 0.5f), 0.0f), 1.0f);
+      const float off = fabsf(residual.terms.depth_residual_m) / limit_m;
+      contradiction = fminf(fmaxf(2.0f * (off - 0.5f), 0.0f), 1.0f);
     }
     cells.residual.at(row, col) = residual;
     cells.evidence.at(row, col) = contradiction;
@@ -267,7 +260,7 @@ struct StaticPixelPass {
       const float s = z_m / trust_area_m;
       t *= fminf(1.0f, s * s);
     }
-    if (mask.data && doubted(cells.evidence.at(r, c))) t = 0.0f;
+    if (mask.data && cells.evidence.at(r, c) >= kContradicts) t = 0.0f;
     if (dynamic) t *= mask.data ? 0.0f : kExpectedTrust;
     trust.at(row, col) = static_cast<uint8_t>(t + 0.5f);
   }

@@ -382,9 +382,9 @@ void CpuEngine::remember_cells(const Se3& T_map_cam) {
   std::copy_n(now.luma.data, now.luma.pixels(), before.luma.data);
   std::copy_n(now.crept_m.data, now.crept_m.pixels(), before.crept_m.data);
   for (int32_t i = 0; i < now.dynamic.pixels(); ++i)
-    before.dynamic.data[i] = now.dynamic.data[i]             ? kMasked
-                             : doubted(now.evidence.data[i]) ? kDoubted
-                                                             : uint8_t{0};
+    before.dynamic.data[i] = now.dynamic.data[i]                    ? kMasked
+                             : now.evidence.data[i] >= kContradicts ? kDoubted
+                                                                    : uint8_t{0};
   std::copy_n(now.still.data, now.still.pixels(), before.still.data);
   T_before_ = T_map_cam;
   if (masks_++ % masks_between_earlier() != 0) return;

@@ -239,20 +239,6 @@ TEST(CpuEngine, ByPartsTheMaskIsTheBoxButForItsRim) {
   EXPECT_EQ(beyond, 0);
 }
 
-TEST(CpuEngine, ByPartsOnlyWhatIsBeforeTheMapIsAMover) {
-  EngineParams p = small_params();
-  p.mask.moved_m = 0;  // by what the map says alone
-  Rig rig(p);
-  const Intrinsics k = corner_camera(kWidth);
-  CornerScene nearer = with_box(), farther = with_box();
-  nearer.box->low.z -= 0.07;
-  farther.box->low.z += 0.07;
-  farther.box->high.z += 0.07;
-  rig.add(CornerView(with_box(), k, {}), {}, 3);
-  EXPECT_GT(rig.mask(CornerView(nearer, k, {})).masked_pixels, 2000);
-  EXPECT_EQ(rig.mask(CornerView(farther, k, {})).masked_pixels, 0);
-}
-
 /// Frames of a box that came and stays, until the mask lets go of it.
 int32_t frames_until_static(Rig& rig, const CornerView& view, int32_t at_most) {
   for (int32_t n = 0; n < at_most; ++n) {
