@@ -81,8 +81,8 @@ STILLMAP_HD Intrinsics cell_intrinsics(const Intrinsics& k, int32_t px) {
   return {k.fx * s, k.fy * s, (k.cx - half) * s, (k.cy - half) * s, k.width / px, k.height / px};
 }
 
-/// A jump between neighbouring measurements that parts two surfaces: three times what a slanted surface shows
-/// from one cell to the next, and never less than what the sensor smears at an edge.
+/// A jump between neighbouring measurements that parts two surfaces: more than a slanted surface shows from
+/// one cell to the next, and never less than what the sensor smears at an edge.
 STILLMAP_HD float depth_edge_m(float z_m) {
   constexpr float kShare = 0.025f, kLeastM = 0.03f;
   return fmaxf(kShare * z_m, kLeastM);
