@@ -59,4 +59,11 @@ STILLMAP_HD Intrinsics subsampled(const Intrinsics& k, int32_t step) {
   return {k.fx * s, k.fy * s, k.cx * s, k.cy * s, (k.width + step - 1) / step, (k.height + step - 1) / step};
 }
 
+/// The camera whose pixels are cells of `px` x `px` pixels; whole cells only, and the
+/// centre of cell (r, c) is pixel (r, c).                              test: small_view_test
+STILLMAP_HD Intrinsics shrunk(const Intrinsics& k, int32_t px) {
+  const float s = 1.0f / static_cast<float>(px), middle = 0.5f * static_cast<float>(px - 1);
+  return {k.fx * s, k.fy * s, (k.cx - middle) * s, (k.cy - middle) * s, k.width / px, k.height / px};
+}
+
 }  // namespace stillmap

@@ -75,12 +75,6 @@ struct CellGrid {
   }
 };
 
-/// Camera of the grid of cells: the centre of cell (r, c) is its pixel (r, c).
-STILLMAP_HD Intrinsics cell_intrinsics(const Intrinsics& k, int32_t px) {
-  const float s = 1.0f / static_cast<float>(px), half = 0.5f * static_cast<float>(px - 1);
-  return {k.fx * s, k.fy * s, (k.cx - half) * s, (k.cy - half) * s, k.width / px, k.height / px};
-}
-
 /// A jump between neighbouring measurements that parts two surfaces: more than a slanted surface shows from
 /// one cell to the next, and never less than what the sensor smears at an edge.
 STILLMAP_HD float depth_edge_m(float z_m) {

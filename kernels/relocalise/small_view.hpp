@@ -27,12 +27,6 @@ STILLMAP_HD int32_t cell_px(int32_t width) {
   return (width + kSmallCols - 1) / kSmallCols;
 }
 
-/// The camera whose pixels are cells of `px` x `px` pixels; whole cells only.
-STILLMAP_HD Intrinsics shrunk(const Intrinsics& k, int32_t px) {
-  const float s = 1.0f / static_cast<float>(px), middle = 0.5f * static_cast<float>(px - 1);
-  return {k.fx * s, k.fy * s, (k.cx - middle) * s, (k.cy - middle) * s, k.width / px, k.height / px};
-}
-
 /// One cell from the prepared images; masked pixels are left out.              test: small_view_test
 struct ShrinkPass {
   ImageView<const float> depth_m;

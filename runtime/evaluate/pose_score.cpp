@@ -49,7 +49,8 @@ PoseErrors PoseScore::add(const FrameResult& result, const std::optional<Se3d>& 
   errors.error_m = norm(result.T_map_cam.translation - true_T_map_cam.translation);
   errors.error_deg =
       kDegPerRad * norm(log_rotation(transposed(true_T_map_cam.rotation) * result.T_map_cam.rotation));
-  errors.off = !(errors.error_m <= kGoodPose_m && errors.error_deg <= kGoodPose_deg);
+  errors.off = !(errors.error_m <= static_cast<double>(kGoodPoseM) &&
+                 errors.error_deg <= static_cast<double>(kGoodPoseDeg));
 
   const bool good = result.state == TrackingState::good, lost = result.state == TrackingState::lost;
   ++counts_.frames;

@@ -10,8 +10,6 @@
 
 namespace stillmap {
 
-inline constexpr double kGoodPose_m = 0.05;    ///< a pose farther from truth is off ...
-inline constexpr double kGoodPose_deg = 3.0;   ///< ... and one turned by more
 inline constexpr double kEnoughStatic = 0.25;  ///< with this share of static pixels tracking has to hold
 inline constexpr double kChi2Bound = 12.592;   ///< 95 % of chi-square with six degrees of freedom lie below
 inline constexpr size_t kMapWindow = 30;       ///< good frames whose mean says where the map lies
@@ -26,7 +24,7 @@ struct StaticShares {
 struct PoseErrors {
   double error_m = 0, error_deg = 0;  ///< of the pose in the map frame, which the first pose aligns
   double chi2 = 0;                    ///< of the error relative to the map, under the reported covariance
-  bool off = false;                   ///< beyond kGoodPose_m or kGoodPose_deg
+  bool off = false;                   ///< beyond kGoodPoseM or kGoodPoseDeg
 };
 
 struct PoseCounts {

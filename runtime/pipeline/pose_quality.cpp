@@ -57,8 +57,9 @@ float probability_within(const std::array<float, 6>& sigma) {
   const auto inside = [](float limit, float x, float y, float z) {
     return std::erf(limit / std::sqrt(2.0f * (x * x + y * y + z * z)));
   };
+  constexpr float kRadPerDeg = 0.017453293f;
   return inside(kGoodPoseM, sigma[0], sigma[1], sigma[2]) *
-         inside(kGoodPoseRad, sigma[3], sigma[4], sigma[5]);
+         inside(kGoodPoseDeg * kRadPerDeg, sigma[3], sigma[4], sigma[5]);
 }
 
 PoseQuality quality_of(const TrackResult& track, const Se3& expected, const TrackParams& params) {

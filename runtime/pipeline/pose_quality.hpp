@@ -14,7 +14,7 @@ enum class TrackingState : uint8_t { good, poor, lost };
 const char* to_string(TrackingState state);
 
 /// A good pose lies within these of the truth.
-inline constexpr float kGoodPoseM = 0.05f, kGoodPoseRad = 0.0524f;
+inline constexpr float kGoodPoseM = 0.05f, kGoodPoseDeg = 3.0f;
 
 struct PoseQuality {
   TrackingState state = TrackingState::lost;
@@ -29,7 +29,8 @@ std::array<float, 6> sigma_about(const float (&covariance)[21], Vec3 centre);
 float probability_within(const std::array<float, 6>& sigma);
 
 /// Of a registration. Three things speak against it: few points near the map (lost, poor), a direction that
-/// the points leave open (poor, by the covariance), a jump that no camera makes (poor).
+/// neither the points nor the prior hold (poor, by the covariance), a step beyond the prediction's reach
+/// (track.prior_reach_*; poor).
 /// @param expected the prediction that it started from                 test: pose_quality_test
 PoseQuality quality_of(const TrackResult& track, const Se3& expected, const TrackParams& params);
 

@@ -23,8 +23,8 @@ namespace {
 constexpr int32_t kRowsPerTile = 16;  ///< of the finest level; a multiple of the coarsest step
 constexpr uint32_t kGroupsPerTile = 16;
 constexpr uint32_t kBlocksPerTile = 32;
-constexpr int32_t kEarlier =
-    4;  ///< frames kept to see what slides; the oldest is mask.reabsorb_frames old, or a third more
+/// Frames kept to see what slides; the oldest is mask.reabsorb_frames old, or a third more.
+constexpr int32_t kEarlier = 4;
 
 /// A length or count of 640x480 pixels, scaled to the image.
 int32_t scaled_px(int32_t px_at_640, int32_t width) {
@@ -116,7 +116,7 @@ struct CpuMemory {
  private:
   void carve_cells(Arena& arena, const Intrinsics& k) {
     cells.px = cell_px_for(k.width);
-    cells.k = cell_intrinsics(k, cells.px);
+    cells.k = shrunk(k, cells.px);
     const int32_t rows = cells.k.height, cols = cells.k.width;
     cells.depth_m = arena.take_image<float>("parts", rows, cols);
     cells.luma = arena.take_image<float>("parts", rows, cols);
@@ -387,8 +387,9 @@ void CpuEngine::remember_cells(const Se3& T_map_cam) {
                                                                     : uint8_t{0};
   std::copy_n(now.still.data, now.still.pixels(), before.still.data);
   T_before_ = T_map_cam;
-  if (masks_++ % masks_between_earlier() != 0) return;
-  EarlierCells& earlier = memory_.earlier[(masks_ - 1) / masks_between_earlier() % kEarlier];
+  const uint32_t mask = masks_++;
+  if (mask % masks_between_earlier() != 0) return;
+  EarlierCells& earlier = memory_.earlier[mask / masks_between_earlier() % kEarlier];
   std::copy_n(now.depth_m.data, now.depth_m.pixels(), earlier.depth_m.data);
   std::copy_n(now.luma.data, now.luma.pixels(), earlier.luma.data);
   earlier.T_map_cam = T_map_cam;

@@ -7,6 +7,8 @@
 namespace stillmap {
 namespace {
 
+constexpr float kGoodPoseRad = kGoodPoseDeg * 0.017453293f;
+
 /// Entry of a row-by-row upper triangle.
 int32_t at(int32_t row, int32_t col) {
   return row * 6 - row * (row - 1) / 2 + col - row;
