@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "runtime/ports/frame_source.hpp"
+
 namespace stillmap::synthetic {
 
 namespace {
@@ -322,7 +324,7 @@ void Renderer::shade(const World& world, Vec3 camera_world, const Hits& hits, Id
       images.depth_m[i] = depth;
       images.cos_incidence[i] = cos_incidence;
       images.colour[i] = {to_byte(colour.x), to_byte(colour.y), to_byte(colour.z)};
-      images.mask[i] = shape.moving ? 255 : 0;
+      images.mask[i] = shape.moving ? kTrulyDynamic : shape.put_down ? kPutDown : uint8_t{0};
     }
   }
 }

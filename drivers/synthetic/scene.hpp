@@ -37,6 +37,7 @@ struct Shape {
   Vec3 half_m;
   Se3 T_world_local;
   Material material;
+  bool put_down = false;  ///< moved within the last second, and stands still now
 };
 
 /// Surfaces of a room besides its walls.

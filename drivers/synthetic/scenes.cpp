@@ -29,6 +29,14 @@ void add_box(World& world, Vec3 centre, Vec3 half, float yaw, const Material& ma
   world.shapes.back().moving = moving;
 }
 
+/// A box that is carried until `down_s` and stands where it is from then on.
+void add_carried_box(World& world, Vec3 centre, Vec3 half, float yaw, const Material& material, double t,
+                     double down_s) {
+  constexpr double kJustNowS = 1.0;
+  add_box(world, centre, half, yaw, material, t < down_s);
+  world.shapes.back().put_down = t >= down_s && t < down_s + kJustNowS;
+}
+
 /// The hands at the two sides of a box whose width is along its local y.
 void hold(Stance& person, Vec3 centre, Vec3 half, float box_yaw, float height_m, double grip = 1.0) {
   const Vec3 side = yaw_rotation(box_yaw) * Vec3{0, half.y + 0.03f, 0};
@@ -358,6 +366,8 @@ Spot2 stroll(double t) {
   return {-0.28 + 0.06 * wave(t, 5.3), 0.48 * wave(t, 6.2)};
 }
 
+constexpr double kCartonDown = 6.0;
+
 void placing_movers(double t, World& world) {
   const Spot2 before_stand = {kStand.x - 0.02, kStand.y - 0.58};
   const auto path = [&](double s) {
@@ -373,13 +383,15 @@ void placing_movers(double t, World& world) {
   Stance person = walk(path, t, mixed({-0.6, 0.35}, {0.0, 3.0}, turned));
   const float down = static_cast<float>(rise(4.9, 6.0, t));
   const Vec3 carried = before(person, 0.43f, 1.22f);
-  const Vec3 centre = t < 6.0 ? carried + down * (at_rest() - carried) : at_rest();
-  const auto yaw = static_cast<float>((1.0 - static_cast<double>(down)) * static_cast<double>(person.yaw) +
-                                      static_cast<double>(down) * 0.25 * kTurn);
-  hold(person, centre, kCartonHalf, t < 6.0 ? yaw : static_cast<float>(0.25 * kTurn), -0.02f,
-       1.0 - rise(6.05, 6.7, t));
+  const bool held = t < kCartonDown;
+  const Vec3 centre = held ? carried + down * (at_rest() - carried) : at_rest();
+  const auto turning =
+      static_cast<float>((1.0 - static_cast<double>(down)) * static_cast<double>(person.yaw) +
+                         static_cast<double>(down) * 0.25 * kTurn);
+  const float yaw = held ? turning : static_cast<float>(0.25 * kTurn);
+  hold(person, centre, kCartonHalf, yaw, -0.02f, 1.0 - rise(6.05, 6.7, t));
   add_person(world, person, 1);
-  add_box(world, centre, kCartonHalf, t < 6.0 ? yaw : static_cast<float>(0.25 * kTurn), kCarton, t < 6.0);
+  add_carried_box(world, centre, kCartonHalf, yaw, kCarton, t, kCartonDown);
 }
 
 /// Somebody comes at `arrive_s`, takes the box from the stand at `take_s`, and walks about with it until
@@ -445,7 +457,6 @@ void placing_obstructing_movers(double t, World& world) {
     return along(way, s);
   };
   const Spot2 c = crate(t);
-  const bool moving = t < kCrateDown;
   const double lifted = 0.06 * (1.0 - rise(6.8, kCrateDown, t));
   const Vec3 centre = to_float(c.x, c.y, static_cast<double>(kCrateHalf.z) + lifted);
   const float yaw = static_cast<float>(0.15 * (1.0 - rise(1.0, 6.8, t)));
@@ -462,7 +473,7 @@ void placing_obstructing_movers(double t, World& world) {
       },
       t, {-0.45, 0.0});
   add_person(world, helper, 0);
-  add_box(world, centre, kCrateHalf, yaw, kBigCarton, moving);
+  add_carried_box(world, centre, kCrateHalf, yaw, kBigCarton, t, kCrateDown);
 }
 
 // ---- camera and people together

@@ -51,6 +51,7 @@ std::string add_trajectory(const std::string& truth_path, const std::string& est
 void add_observed(const TruthObserver& truth, AccuracyFigures& figures) {
   figures.mask_iou = truth.masks().iou();
   figures.static_masked = truth.masks().static_masked();
+  figures.still_masked = truth.masks().still_masked();
   const PoseCounts& poses = truth.poses();
   if (poses.frames == 0) return;
   figures.undeclared_loss = figure(poses.undeclared_loss);

@@ -20,11 +20,11 @@ struct AccuracyFigures {
   double ate_rmse_m = kUnknown;                           ///< SE(3) alignment
   double ate_to_twin = kUnknown;                          ///< over that of the static twin with the same seed
   double rpe_rmse_m = kUnknown, rpe_rmse_deg = kUnknown;  ///< over one second
-  double mask_iou = kUnknown, static_masked = kUnknown;   ///< see MaskScore
-  double undeclared_loss = kUnknown, declared_loss = kUnknown;  ///< frames, see PoseCounts
-  double good = kUnknown, good_off = kUnknown;                  ///< frames
-  double in_view = kUnknown, in_view_good = kUnknown;           ///< frames
-  double chi2_frames = kUnknown, chi2_inside = kUnknown;        ///< frames
+  double mask_iou = kUnknown, static_masked = kUnknown, still_masked = kUnknown;  ///< see MaskScore
+  double undeclared_loss = kUnknown, declared_loss = kUnknown;                    ///< frames, see PoseCounts
+  double good = kUnknown, good_off = kUnknown;                                    ///< frames
+  double in_view = kUnknown, in_view_good = kUnknown;                             ///< frames
+  double chi2_frames = kUnknown, chi2_inside = kUnknown;                          ///< frames
   double within_2cm = kUnknown;    ///< share of the mesh's vertices that near to the true surface
   double ghosts = kUnknown;        ///< share of vertices farther than 10 cm
   double completeness = kUnknown;  ///< share of the surface seen for a second that is there within 2 cm
@@ -44,6 +44,7 @@ struct AccuracyFigures {
     f("rpe_rmse_deg", &P::rpe_rmse_deg, Worst::highest);
     f("mask_iou", &P::mask_iou, Worst::lowest);
     f("static_masked", &P::static_masked, Worst::highest);
+    f("still_masked", &P::still_masked, Worst::highest);
     f("undeclared_loss", &P::undeclared_loss, Worst::highest);
     f("declared_loss", &P::declared_loss, Worst::highest);
     f("good", &P::good, Worst::lowest);

@@ -27,6 +27,7 @@ const std::vector<Part>& parts() {
                                         {"Masks and meshes",
                                          {{"mask IoU %", &AccuracyFigures::mask_iou, 100, 1},
                                           {"static masked %", &AccuracyFigures::static_masked, 100, 2},
+                                          {"with just put down %", &AccuracyFigures::still_masked, 100, 2},
                                           {"within 2 cm %", &AccuracyFigures::within_2cm, 100, 1},
                                           {"ghosts %", &AccuracyFigures::ghosts, 100, 2},
                                           {"complete %", &AccuracyFigures::completeness, 100, 1}}}};

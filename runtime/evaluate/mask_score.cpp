@@ -25,7 +25,7 @@ void MaskComparison::find_edges(ImageView<const uint8_t> truth) {
     for (int32_t col = 0; col < cols_; ++col) {
       uint8_t seen = 0;
       for (int32_t c = std::max(col - kBorder_px, 0); c <= std::min(col + kBorder_px, cols_ - 1); ++c)
-        seen |= truth.at(row, c) != 0 ? kDynamicNear : kStaticNear;
+        seen |= truth.at(row, c) == kTrulyDynamic ? kDynamicNear : kStaticNear;
       out[col] = seen;
     }
   }
@@ -44,13 +44,18 @@ MaskCounts MaskComparison::compare(ImageView<const uint8_t> truth, ImageView<con
   n.pixels = static_cast<int64_t>(rows_) * cols_;
   for (int32_t row = 0; row < rows_; ++row)
     for (int32_t col = 0; col < cols_; ++col) {
-      const bool dynamic = truth.at(row, col) != 0, masked = mask.at(row, col) != 0;
+      const bool dynamic = truth.at(row, col) == kTrulyDynamic, masked = mask.at(row, col) != 0;
       const float z_m = depth_m.at(row, col);
       n.truly_dynamic += dynamic;
       if (!(z_m >= kValidDepthMin_m && z_m <= kValidDepthMax_m)) continue;
       ++n.valid;
       n.valid_static += !dynamic;
       if (near_[static_cast<size_t>(row * cols_ + col)] == (kStaticNear | kDynamicNear)) continue;
+      if (truth.at(row, col) == kPutDown) {
+        ++n.put_down;
+        n.put_down_masked += masked;
+        continue;
+      }
       n.judged_both += masked && dynamic;
       n.judged_either += masked || dynamic;
       n.judged_static += !dynamic;
@@ -76,6 +81,11 @@ void MaskScore::add(Stamp stamp, const MaskCounts& counts) {
     iou_sum_ += static_cast<double>(counts.judged_both) / static_cast<double>(counts.judged_either);
     ++iou_frames_;
   }
+  const int64_t still = counts.judged_static + counts.put_down;
+  if (still == 0) return;
+  still_sum_ +=
+      static_cast<double>(counts.judged_false + counts.put_down_masked) / static_cast<double>(still);
+  ++still_frames_;
   if (counts.judged_static == 0) return;
   false_sum_ += static_cast<double>(counts.judged_false) / static_cast<double>(counts.judged_static);
   ++false_frames_;

@@ -89,7 +89,7 @@ void SeenSurface::look(const Se3d& T_world_cam, const Intrinsics& k, ImageView<c
     if (!depth_m.contains(row, col)) continue;
     const float z_m = depth_m.at(row, col);
     if (!(z_m > 0) || std::abs(z_m - p.z) > kAgree_m + kNoisePerSquareMetre * p.z * p.z) continue;
-    if (truth_mask.data != nullptr && truth_mask.at(row, col) != 0) continue;
+    if (truth_mask.data != nullptr && truth_mask.at(row, col) == kTrulyDynamic) continue;
     ++frames_[i];
   }
 }

@@ -22,7 +22,7 @@ class SeenSurface {
 
   /// A point is seen where it projects into the view, the depth there is valid and lies within 3 cm plus the
   /// sensor's noise (4 mm per square metre) of it, and no mover is there.
-  /// @param T_world_cam true  @param truth_mask 0: static; may have no data: nothing moves
+  /// @param T_world_cam true  @param truth_mask as RgbdFrame's; no data: nothing moves
   /// test: surface_score_test
   void look(const Se3d& T_world_cam, const Intrinsics& k, ImageView<const float> depth_m,
             ImageView<const uint8_t> truth_mask);

@@ -22,6 +22,10 @@ struct Stamp {
   friend auto operator<=>(const Stamp&, const Stamp&) = default;
 };
 
+/// Of RgbdFrame::truth_mask.
+inline constexpr uint8_t kTrulyDynamic = 255;
+inline constexpr uint8_t kPutDown = 1;  ///< stands still, but for less than a second: nobody can know yet
+
 /// Memory of one frame, allocated by its owner with the size of SourceInfo; a source fills it.
 struct RgbdFrame {
   Stamp depth_stamp;  ///< capture of the depth image
@@ -29,7 +33,8 @@ struct RgbdFrame {
   uint32_t sequence = 0;          ///< index in the source, skipped and bad frames counted
   ImageView<uint16_t> depth_raw;  ///< 0 and 65535: invalid
   ImageView<Rgb8> colour;
-  ImageView<uint8_t> truth_mask;  ///< 255: truly dynamic; only when SourceInfo::has_truth_mask, else no data
+  ImageView<uint8_t> truth_mask;  ///< kTrulyDynamic, kPutDown or 0; only when SourceInfo::has_truth_mask,
+                                  ///< else no data
   std::optional<Se3d> truth_T_world_cam;  ///< source's world; only where the source knows it
 };
 

@@ -10,6 +10,7 @@
 #include "drivers/synthetic/renderer.hpp"
 #include "drivers/synthetic/scene.hpp"
 #include "drivers/synthetic/sensor_model.hpp"
+#include "runtime/ports/frame_source.hpp"
 
 namespace stillmap::synthetic {
 namespace {
@@ -33,10 +34,10 @@ std::vector<Shares> shares_over(const Scene& scene, double step_s) {
     renderer.render(world_at(scene, t, false), scene.camera(t), workers, images);
     int moving = 0, valid = 0, still = 0;
     for (size_t i = 0; i < images.mask.size(); ++i) {
-      moving += images.mask[i] != 0 ? 1 : 0;
+      moving += images.mask[i] == kTrulyDynamic ? 1 : 0;
       if (images.depth_m[i] < kDepthMinM || images.depth_m[i] > kDepthMaxM) continue;
       ++valid;
-      still += images.mask[i] == 0 ? 1 : 0;
+      still += images.mask[i] != kTrulyDynamic ? 1 : 0;
     }
     all.push_back({t, static_cast<double>(moving) / static_cast<double>(images.mask.size()),
                    static_cast<double>(still) / std::max(valid, 1)});
@@ -309,6 +310,24 @@ TEST(Scenes, a_box_is_dynamic_while_it_is_carried_and_static_while_it_rests) {
     EXPECT_TRUE(box_moves(name, 6.0)) << name;
     EXPECT_TRUE(box_moves(name, 12.0)) << name;
   }
+}
+
+TEST(Scenes, a_box_was_just_put_down_for_a_second) {
+  const auto put_down = [](const char* name, double t) {
+    return world_at(scene_named(name), t, false).shapes.back().put_down;
+  };
+  const struct {
+    const char* name;
+    double down_s;
+  } cases[] = {{"placing_box", 6.0}, {"placing_obstructing_box", 7.6}};
+  for (const auto& c : cases) {
+    EXPECT_FALSE(put_down(c.name, c.down_s - 0.01)) << c.name;
+    EXPECT_TRUE(put_down(c.name, c.down_s + 0.01)) << c.name;
+    EXPECT_FALSE(box_moves(c.name, c.down_s + 0.01)) << c.name;
+    EXPECT_TRUE(put_down(c.name, c.down_s + 0.99)) << c.name;
+    EXPECT_FALSE(put_down(c.name, c.down_s + 1.01)) << c.name;
+  }
+  EXPECT_FALSE(put_down("removing_box", 0.0));  // has stood there all the time
 }
 
 TEST(Scenes, a_resting_box_does_not_move) {

@@ -64,6 +64,20 @@ TEST(MaskComparison, OnlyValidDepthCounts) {
   EXPECT_DOUBLE_EQ(n.static_share_of_view(), 0.25);
 }
 
+TEST(MaskComparison, WhatWasJustPutDownIsCountedApart) {
+  Images images;
+  for (int32_t i = 0; i < kRows * kCols; ++i)
+    if (i % kCols < 4) images.truth[static_cast<size_t>(i)] = kPutDown;
+  images.mask_from(2);
+  const MaskCounts n = images.counts();
+  EXPECT_EQ(n.put_down, kRows * 4);
+  EXPECT_EQ(n.put_down_masked, kRows * 2);
+  EXPECT_EQ(n.valid_static, kRows * 20);  // it stands still
+  EXPECT_EQ(n.judged_static, kRows * 13);
+  EXPECT_EQ(n.judged_false, kRows * 13);
+  EXPECT_EQ(n.judged_either, kRows * 30);
+}
+
 Stamp at(double s) {
   return {static_cast<int64_t>(s * 1e9)};
 }
