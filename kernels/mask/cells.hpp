@@ -34,6 +34,7 @@ constexpr Contradiction kContradicts = 0.5f;
 /// A frame that shows another brightness takes back so many of the frames that a cell stood still: noise
 /// alone does it now and then.
 constexpr int32_t kOtherLumaFrames = 8;
+constexpr int32_t kRimCells = 4;    ///< a surface that comes into view goes on from its rim, if this near
 constexpr float kSameLuma = 0.1f;   ///< of white: brightness that noise and resampling change
 constexpr float kStillM = 0.01f;    ///< what stands still may seem to lie off, without noise
 constexpr float kNearestM = 0.05f;  ///< nearer than this nothing is projected
@@ -191,6 +192,7 @@ struct StillPass {
   CellsBefore before;
   Se3 T_before_now;
   DepthNoise noise;
+  int32_t most_rim_frames = 0;  ///< what comes into view has stood still for no more of them
 
   STILLMAP_HD void operator()(int32_t row, int32_t col) const {
     int32_t frames = 0;
@@ -201,13 +203,18 @@ struct StillPass {
   }
 
  private:
+  STILLMAP_HD static int32_t inside(int32_t i, int32_t size) { return i < 0 ? 0 : i < size ? i : size - 1; }
+  STILLMAP_HD static int32_t abs_of(int32_t i) { return i < 0 ? -i : i; }
   STILLMAP_HD void look_back(int32_t row, int32_t col, int32_t& frames, float& crept_m) const {
     const Vec3 p = T_before_now * cells.point(row, col);
     if (p.z < kNearestM) return;
     const Pixel at = project(cells.k, p);
-    const int32_t r = static_cast<int32_t>(floorf(at.v + 0.5f)),
-                  c = static_cast<int32_t>(floorf(at.u + 0.5f));
-    if (!before.depth_m.contains(r, c) || before.depth_m.at(r, c) <= 0.0f) return;
+    const int32_t at_r = static_cast<int32_t>(floorf(at.v + 0.5f)),
+                  at_c = static_cast<int32_t>(floorf(at.u + 0.5f));
+    const int32_t r = inside(at_r, before.depth_m.rows), c = inside(at_c, before.depth_m.cols);
+    const bool seen = r == at_r && c == at_c;
+    if (abs_of(r - at_r) > kRimCells || abs_of(c - at_c) > kRimCells || before.depth_m.at(r, c) <= 0.0f)
+      return;
     const Vec3 was =
         unproject(cells.k, static_cast<float>(c), static_cast<float>(r), before.depth_m.at(r, c));
     // Along the normal: the cell need not be met in its middle.
@@ -216,6 +223,10 @@ struct StillPass {
     const float z_m = cells.depth_m.at(row, col), near_m = kStillM + 2.0f * noise.at(z_m);
     if (fabsf(was.z - p.z) > depth_edge_m(z_m) + near_m || fabsf(off_m) > near_m) return;
     crept_m = off_m;
+    if (!seen) {
+      frames = before.still.at(r, c) < most_rim_frames ? before.still.at(r, c) : most_rim_frames;
+      return;
+    }
     const bool same = fabsf(before.luma.at(r, c) - cells.luma.at(row, col)) < kSameLuma * kLumaScale;
     frames = before.still.at(r, c) + (same ? 1 : -kOtherLumaFrames);
   }

@@ -357,7 +357,8 @@ void CpuEngine::mask_by_parts(const Se3& T_map_cam) {
                                   params_.mask.contradict_sigmas};
   in_row_tiles(cells.depth_m.rows,
                [&](int32_t first, int32_t last) { loops_.cell_evidence(evidence, first, last); });
-  const StillPass still{cells, memory_.before, inverse(T_before_) * T_map_cam, noise};
+  const StillPass still{cells, memory_.before, inverse(T_before_) * T_map_cam, noise,
+                        params_.mask.reabsorb_frames / 2};
   in_row_tiles(cells.depth_m.rows,
                [&](int32_t first, int32_t last) { loops_.still_cells(still, first, last); });
   const int32_t parts = segment(cells, memory_.part_memory, params_.mask, noise);

@@ -172,6 +172,24 @@ TEST_F(PartsTest, StandingStillIsCountedAndMovingOrCreepingIsNot) {
   EXPECT_EQ(after(30, 43), 0);
 }
 
+TEST_F(PartsTest, WhatComesIntoViewGoesOnFromTheRimButNotInFull) {
+  StillPass pass{cells, before, {}, noise, 6};
+  const auto seen_from = [&](float cells_to_the_left) {
+    pass.T_before_now.translation = {-cells_to_the_left * kWallM / 80.0f, 0, 0};
+    pass(30, 1);
+    return static_cast<int>(cells.still.at(30, 1));
+  };
+  EXPECT_EQ(seen_from(0), 10);
+  EXPECT_EQ(seen_from(1), 10);
+  EXPECT_EQ(seen_from(2), 6);
+  EXPECT_EQ(seen_from(5), 6);
+  EXPECT_EQ(seen_from(6), 0);  // too far beyond it
+  before.still.at(30, 0) = 3;
+  EXPECT_EQ(seen_from(2), 3);
+  before.depth_m.at(30, 0) = kNearM;  // another surface
+  EXPECT_EQ(seen_from(2), 0);
+}
+
 TEST_F(PartsTest, APixelBelongsToTheCellOfItsSurface) {
   put(kBox, kNearM, 1);
   in(kBox, [&](int32_t r, int32_t c) { cells.dynamic.at(r, c) = 255; });
