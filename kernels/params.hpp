@@ -52,6 +52,7 @@ struct TrackParams {
   float kernel_sigmas = 2.0f;
   float trust_noise_m = 0.01f;
   float trust_area_m = 2.5f;
+  float probation_trust = 0.25f;
   int32_t first_finest_level = 1;
   int32_t levels = 3;
   int32_t iterations_coarse = 6;
@@ -96,6 +97,8 @@ struct TrackParams {
       "a point weighs s^2 / (s^2 + noise^2); 0: noise changes no weight");
     f("trust_area_m", &P::trust_area_m, 0, 20.0, "m", "ours",
       "nearer points weigh less, with the square of their depth, as the area that they cover; 0: off");
+    f("probation_trust", &P::probation_trust, 0, 1.0, "1", "ours",
+      "in the second registration, of what the map has seen too seldom for its mesh (map.mesh_min_surface)");
     f("first_finest_level", &P::first_finest_level, 0, 2, "level", "ours",
       "where the first registration ends: 0 every pixel, 1 every 2nd; the second one goes to 0");
     f("levels", &P::levels, 1, 3, "levels", "III-B", "coarse-to-fine sub-samplings, finest is every pixel");

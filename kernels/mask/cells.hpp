@@ -65,6 +65,7 @@ struct CellGrid {
   ImageView<Vec3> normal;    ///< camera frame, towards the camera; 0: none
   ImageView<Contradiction> evidence;
   ImageView<CellResidual> residual;
+  ImageView<uint8_t> fused;     ///< measurements that made the map's surface there; few: it is on probation
   ImageView<float> crept_m;     ///< how far it has gone along its normal in that time
   ImageView<uint8_t> still;     ///< frames that the surface in a cell has been where it is, at most 255
   ImageView<uint8_t> expected;  ///< kDoubted, or 255: dynamic by the last frame's mask, carried into this one
@@ -165,6 +166,7 @@ struct CellEvidencePass {
     const float z_m = cells.depth_m.at(row, col);
     CellResidual residual = {};
     Contradiction contradiction = kUnknown;
+    uint8_t fused = 0;
     TrackPoint<float> point;
     if (track.fetch(row, col, z_m, cells.luma.at(row, col), cache, point)) {
       residual.terms = point_terms(point, track.weights);
@@ -173,9 +175,22 @@ struct CellEvidencePass {
           fminf(contradict_m + contradict_sigmas * noise.at(z_m), 0.9f * track.map.truncation_m);
       const float off = fabsf(residual.terms.depth_residual_m) / limit_m;
       contradiction = fminf(fmaxf(2.0f * (off - 0.5f), 0.0f), 1.0f);
+      fused = fused_at(track.point_of(static_cast<float>(row), static_cast<float>(col), z_m).cell, cache);
     }
+    cells.fused.at(row, col) = fused;
     cells.residual.at(row, col) = residual;
     cells.evidence.at(row, col) = contradiction;
+  }
+
+ private:
+  /// Measurements on a surface in the voxel next to a point.
+  template <class Cache>
+  STILLMAP_HD uint8_t fused_at(const GridCell<float>& cell, Cache& cache) const {
+    const auto up = [](float fraction) { return fraction >= 0.5f ? 1 : 0; };
+    const Int3 voxel = {cell.x + up(cell.fraction.x), cell.y + up(cell.fraction.y),
+                        cell.z + up(cell.fraction.z)};
+    const VoxelBlock* const block = lookup(track.map, pack(block_of_voxel(voxel)), cache);
+    return block ? block->record[index_in_block(voxel)].colour_weight : uint8_t{0};
   }
 };
 
@@ -241,6 +256,8 @@ struct StaticPixelPass {
   DepthNoise noise;
   float trust_noise_m = 0;  ///< 0: noise changes no trust
   float trust_area_m = 0;
+  float probation_trust = 1;         ///< of what the map has seen too seldom for its mesh
+  int32_t probation_ends_after = 0;  ///< measurements
 
   /// What is expected to move keeps this much trust until the mask is known: it may have stopped.
   static constexpr float kExpectedTrust = 0.1f;
@@ -266,6 +283,7 @@ struct StaticPixelPass {
       t *= fminf(1.0f, s * s);
     }
     if (mask.data && cells.evidence.at(r, c) >= kContradicts) t = 0.0f;
+    if (mask.data && cells.fused.at(r, c) < probation_ends_after) t *= probation_trust;
     if (dynamic) t *= mask.data ? 0.0f : kExpectedTrust;
     trust.at(row, col) = static_cast<uint8_t>(t + 0.5f);
   }

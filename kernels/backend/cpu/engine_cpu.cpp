@@ -124,6 +124,7 @@ struct CpuMemory {
     cells.normal = arena.take_image<Vec3>("parts", rows, cols);
     cells.evidence = arena.take_image<Contradiction>("parts", rows, cols);
     cells.expected = arena.take_image<uint8_t>("parts", rows, cols);
+    cells.fused = arena.take_image<uint8_t>("parts", rows, cols);
     cells.dynamic = arena.take_image<uint8_t>("parts", rows, cols);
     cells.part = arena.take_image<int32_t>("parts", rows, cols);
     cells.still = arena.take_image<uint8_t>("parts", rows, cols);
@@ -337,7 +338,9 @@ void CpuEngine::write_static_pixels(bool masked) {
                        memory_.trust,
                        depth_noise(params_.depth),
                        params_.track.trust_noise_m,
-                       params_.track.trust_area_m};
+                       params_.track.trust_area_m,
+                       params_.track.probation_trust,
+                       params_.map.mesh_min_surface};
   in_row_tiles(k().height, [&](int32_t first, int32_t last) { loops_.static_pixels(pass, first, last); });
 }
 

@@ -32,6 +32,7 @@ class PartsTest : public testing::Test {
     cells.residual = image(residual, CellResidual{});
     cells.crept_m = image(crept, 0.0f);
     cells.still = image(still, uint8_t{0});
+    cells.fused = image(fused, uint8_t{0});
     cells.expected = image(expected, uint8_t{0});
     cells.dynamic = image(dynamic, uint8_t{0});
     cells.part = image(part, int32_t{-1});
@@ -103,7 +104,7 @@ class PartsTest : public testing::Test {
   std::vector<float> depth, luma, evidence, crept, depth_before, luma_before, crept_before;
   std::vector<Vec3> normal;
   std::vector<CellResidual> residual;
-  std::vector<uint8_t> still, expected, dynamic, dynamic_before, still_before, border, scratch;
+  std::vector<uint8_t> still, fused, expected, dynamic, dynamic_before, still_before, border, scratch;
   std::vector<int32_t> part, queue;
   std::vector<Part> parts;
 };

@@ -214,6 +214,17 @@ TEST_F(PartsTest, APixelBelongsToTheCellOfItsSurface) {
   EXPECT_EQ(trust[30 * kCols + 29], 0);
   const float n = noise.at(kWallM);
   EXPECT_NEAR(trust[0], 255.0f * 1e-4f / (1e-4f + n * n), 1.0f);
+  pass.probation_trust = 0.25f;
+  pass.probation_ends_after = 10;
+  cells.fused.at(0, 0) = 9;
+  cells.fused.at(0, 1) = 10;
+  pass(0, 0);
+  pass(0, 1);
+  EXPECT_NEAR(trust[0], 0.25f * trust[1], 1.0f);
+  EXPECT_EQ(mask[0], 0);
+  pass.mask = {};  // before the mask is known nothing is on probation
+  pass(0, 0);
+  EXPECT_EQ(trust[0], trust[1]);
 }
 
 }  // namespace
