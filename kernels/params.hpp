@@ -52,7 +52,7 @@ struct TrackParams {
   float kernel_sigmas = 2.0f;
   float trust_noise_m = 0.01f;
   float trust_area_m = 2.5f;
-  float probation_trust = 0.25f;
+  float probation_trust = 0.5f;
   int32_t first_finest_level = 1;
   int32_t levels = 3;
   int32_t iterations_coarse = 6;
