@@ -75,7 +75,7 @@ struct TrackParams {
   float lost_inlier_ratio = 0.2f;
   float poor_inlier_ratio = 0.4f;
   float inlier_m = 0.03f;
-  float correlated_points = 100.0f;
+  float correlated_points = 140.0f;
 
   template <class F>
   static void fields(F&& f) {

@@ -1,0 +1,98 @@
+// What the map says of a cell.
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "kernels/mask/cells.hpp"
+#include "tests/support/corner_scene.hpp"
+
+namespace stillmap {
+namespace {
+
+constexpr float kVoxelM = 0.02f, kTruncationM = 0.1f;
+
+/// A view of the corner, a cell a pixel, compared with its map.
+class EvidenceTest : public testing::Test {
+ protected:
+  EvidenceTest() : map(test::corner_map(scene, kVoxelM, kTruncationM)), view(scene, camera, Se3d{}) {
+    cells.px = 1;
+    cells.k = camera;
+    cells.depth_m = image(depth, 0.0f);
+    std::copy(view.depth_m.begin(), view.depth_m.end(), depth.begin());
+    cells.luma = image(luma, 20000.0f);
+    cells.residual = image(residual, CellResidual{});
+    cells.evidence = image(evidence, kUnknown);
+    cells.fused = image(fused, uint8_t{255});
+    pass.cells = cells;
+    pass.track.map = map.view();
+    pass.track.depth_m = cells.depth_m;
+    pass.track.k = camera;
+    pass.track.max_m = 5.0f;
+    pass.track.weights = {kTruncationM / static_cast<float>(kSdfMax),
+                          1.0f / kVoxelM,
+                          0.025f,
+                          0.03f,
+                          RobustKernel::huber,
+                          0.02f};
+    pass.noise = {0.001f, 0.0015f};
+    pass.contradict_m = 0.05f;
+    pass.contradict_sigmas = 2.0f;
+  }
+  template <class T>
+  ImageView<T> image(std::vector<T>& data, T value) {
+    data.assign(static_cast<size_t>(camera.width * camera.height), value);
+    return {data.data(), camera.height, camera.width, camera.width};
+  }
+  void look(int32_t row, int32_t col) {
+    BlockCache cache;
+    pass(row, col, cache);
+  }
+
+  static constexpr int32_t kRow = 20, kCol = 16;  ///< of a cell on the back wall
+  test::CornerScene scene;
+  Intrinsics camera = test::corner_camera(80);
+  AnalyticMap map;
+  test::CornerView view;
+  std::vector<float> depth, luma;
+  std::vector<CellResidual> residual;
+  std::vector<Contradiction> evidence;
+  std::vector<uint8_t> fused;
+  CellGrid cells;
+  CellEvidencePass pass;
+};
+
+TEST_F(EvidenceTest, OnTheSurfaceNothingContradicts) {
+  look(kRow, kCol);
+  EXPECT_EQ(cells.evidence.at(kRow, kCol), 0.0f);
+  EXPECT_GT(cells.residual.at(kRow, kCol).terms.depth_weight, 0.0f);
+  EXPECT_EQ(cells.fused.at(kRow, kCol), 1);  // the map was seen once
+}
+
+TEST_F(EvidenceTest, WellBeforeTheSurfaceItDoesInFull) {
+  cells.depth_m.at(kRow, kCol) -= 0.075f;
+  look(kRow, kCol);
+  EXPECT_EQ(cells.evidence.at(kRow, kCol), 1.0f);
+}
+
+TEST_F(EvidenceTest, WhereNothingWasEverSeenNobodyKnows) {
+  cells.depth_m.at(kRow, kCol) += 0.5f;
+  look(kRow, kCol);
+  EXPECT_EQ(cells.evidence.at(kRow, kCol), kUnknown);
+  EXPECT_EQ(cells.residual.at(kRow, kCol).terms.depth_weight, 0.0f);
+  EXPECT_EQ(cells.fused.at(kRow, kCol), 0);
+}
+
+TEST_F(EvidenceTest, FusedCountsTheMeasurementsOnTheSurfaceNextToThePoint) {
+  const Vec3 p =
+      unproject(camera, static_cast<float>(kCol), static_cast<float>(kRow), depth[kRow * 80 + kCol]);
+  const auto nearest = [](float m) { return static_cast<int32_t>(std::lround(m / kVoxelM)); };
+  VoxelRecord& record = map.record({nearest(p.x), nearest(p.y), nearest(p.z)});
+  record.colour_weight = 17;
+  record.weight = 60;  // free space counts here, but is no surface
+  look(kRow, kCol);
+  EXPECT_EQ(cells.fused.at(kRow, kCol), 17);
+}
+
+}  // namespace
+}  // namespace stillmap
