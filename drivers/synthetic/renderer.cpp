@@ -162,7 +162,7 @@ struct Renderer::Hits {
 Renderer::Renderer(const Intrinsics& k)
     : k_(k), tile_cols_((k.width + kTile - 1) / kTile), tile_rows_((k.height + kTile - 1) / kTile) {}
 
-void Renderer::render(const World& world, const Se3d& T_world_cam, Workers& workers, IdealImages& images) {
+void Renderer::render(const World& world, const Se3d& T_world_cam, ThreadPool& workers, IdealImages& images) {
   const auto pixels = static_cast<size_t>(k_.width) * static_cast<size_t>(k_.height);
   images.depth_m.resize(pixels);
   images.cos_incidence.resize(pixels);
@@ -175,7 +175,9 @@ void Renderer::render(const World& world, const Se3d& T_world_cam, Workers& work
     cast_.push_back(cast_shape(shape, T_world_cam));
     find_tiles(shape, T_cam_world, cast_.back());
   }
-  workers.run(tile_cols_ * tile_rows_, [&](int32_t tile) { render_tile(world, T_world_cam, tile, images); });
+  workers.for_each(static_cast<uint32_t>(tile_cols_ * tile_rows_), [&](uint32_t tile) {
+    render_tile(world, T_world_cam, static_cast<int32_t>(tile), images);
+  });
 }
 
 Renderer::CastShape Renderer::cast_shape(const Shape& shape, const Se3d& T_world_cam) const {

@@ -8,7 +8,7 @@
 
 #include "drivers/synthetic/scene.hpp"
 #include "drivers/synthetic/texture.hpp"
-#include "drivers/synthetic/workers.hpp"
+#include "kernels/backend/cpu/thread_pool.hpp"
 #include "kernels/base/pinhole.hpp"
 #include "kernels/base/view.hpp"
 
@@ -37,7 +37,7 @@ class Renderer {
   explicit Renderer(const Intrinsics& k);
 
   /// Writes all of `images`. The camera is inside the room.
-  void render(const World& world, const Se3d& T_world_cam, Workers& workers, IdealImages& images);
+  void render(const World& world, const Se3d& T_world_cam, ThreadPool& workers, IdealImages& images);
 
  private:
   static constexpr int32_t kTile = 16;

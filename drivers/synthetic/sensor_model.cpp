@@ -37,13 +37,14 @@ float SensorModel::exposure(double t_s) const {
   return static_cast<float>(1.0 + static_cast<double>(kExposureDrift) * (0.6 * slow + 0.4 * slower));
 }
 
-void SensorModel::measure(const IdealImages& images, uint32_t frame, double t_s, Workers& workers,
+void SensorModel::measure(const IdealImages& images, uint32_t frame, double t_s, ThreadPool& workers,
                           ImageView<uint16_t> depth_raw, ImageView<Rgb8> colour) {
   const FrameKeys keys = {field_key(seed_, frame, 1), field_key(seed_, frame, 2), field_key(seed_, frame, 3),
                           field_key(seed_, frame, 4)};
   const float gain = exposure(t_s);
-  workers.run((k_.height + kBandRows - 1) / kBandRows,
-              [&](int32_t band) { measure_band(images, keys, gain, band, depth_raw, colour); });
+  workers.for_each(static_cast<uint32_t>((k_.height + kBandRows - 1) / kBandRows), [&](uint32_t band) {
+    measure_band(images, keys, gain, static_cast<int32_t>(band), depth_raw, colour);
+  });
 }
 
 void SensorModel::measure_band(const IdealImages& images, const FrameKeys& keys, float gain, int32_t band,

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "drivers/synthetic/renderer.hpp"
-#include "drivers/synthetic/workers.hpp"
+#include "kernels/backend/cpu/thread_pool.hpp"
 #include "kernels/base/pinhole.hpp"
 #include "kernels/base/view.hpp"
 
@@ -33,7 +33,7 @@ class SensorModel {
   SensorModel(const Intrinsics& k, float depth_units_per_m, uint64_t seed);
 
   /// @param depth_raw, colour size of the camera
-  void measure(const IdealImages& images, uint32_t frame, double t_s, Workers& workers,
+  void measure(const IdealImages& images, uint32_t frame, double t_s, ThreadPool& workers,
                ImageView<uint16_t> depth_raw, ImageView<Rgb8> colour);
 
   /// Camera gain at time `t_s`: slow, within 1 -+ kExposureDrift.

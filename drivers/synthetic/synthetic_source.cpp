@@ -8,7 +8,7 @@
 #include "drivers/synthetic/scene.hpp"
 #include "drivers/synthetic/sensor_model.hpp"
 #include "drivers/synthetic/spec.hpp"
-#include "drivers/synthetic/workers.hpp"
+#include "kernels/backend/cpu/thread_pool.hpp"
 
 namespace stillmap {
 
@@ -94,7 +94,7 @@ class SyntheticSource final : public FrameSource {
 
   synthetic::Spec spec_;
   SourceInfo info_;
-  synthetic::Workers workers_;
+  ThreadPool workers_;
   synthetic::Renderer renderer_;
   synthetic::SensorModel sensor_;
   synthetic::WheelOdometry odometry_;

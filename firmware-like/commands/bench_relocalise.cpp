@@ -107,7 +107,7 @@ class Eye {
  private:
   static constexpr uint64_t kSeed = 7;  ///< not that of the map
   FrameSlot slot_;
-  synthetic::Workers workers_;
+  ThreadPool workers_;
   synthetic::Renderer renderer_;
   synthetic::SensorModel sensor_;
   synthetic::IdealImages images_;

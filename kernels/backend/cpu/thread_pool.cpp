@@ -1,9 +1,12 @@
 #include "kernels/backend/cpu/thread_pool.hpp"
 
+#include <algorithm>
+
 namespace stillmap {
 
 ThreadPool::ThreadPool(int32_t threads) {
-  for (int32_t i = 1; i < threads; ++i) workers_.emplace_back([this] { worker_loop(); });
+  constexpr int32_t kMost = 64;
+  for (int32_t i = 1; i < std::min(threads, kMost); ++i) workers_.emplace_back([this] { worker_loop(); });
 }
 
 ThreadPool::~ThreadPool() {

@@ -7,11 +7,11 @@
 
 namespace stillmap {
 
-/// Workers made at boot; the calling thread works too. Work is a run of indices handed out one by one, so
+/// ThreadPool made at boot; the calling thread works too. Work is a run of indices handed out one by one, so
 /// which thread does which index varies, but never what an index does: results must not depend on the thread.
 class ThreadPool {
  public:
-  /// @param threads 1..64, the caller included.  @thread boot
+  /// @param threads 1..64, the caller included; cut to that.  @thread boot
   explicit ThreadPool(int32_t threads);
   ~ThreadPool();
   ThreadPool(const ThreadPool&) = delete;

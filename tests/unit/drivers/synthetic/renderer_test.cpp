@@ -19,7 +19,7 @@ World empty_room() {
 }
 
 IdealImages picture(const World& world, const Se3d& T_world_cam) {
-  Workers workers(1);
+  ThreadPool workers(1);
   Renderer renderer(kCamera);
   IdealImages images;
   renderer.render(world, T_world_cam, workers, images);

@@ -26,7 +26,7 @@ struct Shares {
 };
 
 std::vector<Shares> shares_over(const Scene& scene, double step_s) {
-  Workers workers(2);
+  ThreadPool workers(2);
   Renderer renderer(kCamera);
   IdealImages images;
   std::vector<Shares> all;
@@ -108,7 +108,7 @@ TEST_P(EveryScene, starts_still_unless_it_must_not) {
   const Scene& scene = scene_named(GetParam());
   const std::string name = scene.name;
   const bool from_the_start = name == "crowd_start" || name == "person_tracking";
-  Workers workers(1);
+  ThreadPool workers(1);
   Renderer renderer(kCamera);
   IdealImages images;
   for (double t = 0; t <= 1.0; t += 0.2) {

@@ -38,7 +38,7 @@ IdealImages ideal(const DepthOf& depth_m, float cos_incidence = 1.0f) {
 
 Measured measure(const IdealImages& images, uint32_t frame = 0, double t_s = 0) {
   Measured out;
-  Workers workers(1);
+  ThreadPool workers(1);
   SensorModel sensor(kCamera, kUnits, 7);
   sensor.measure(images, frame, t_s, workers, {out.depth.data(), kRows, kCols, kCols},
                  {out.colour.data(), kRows, kCols, kCols});

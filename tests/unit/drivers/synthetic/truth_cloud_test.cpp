@@ -59,7 +59,7 @@ TEST(TruthCloud, wherever_the_camera_looks_a_point_is_within_a_centimetre) {
   for (const Vec3& p : cloud) cells.insert(key(cell(p.x), cell(p.y), cell(p.z)));
   const synthetic::Scene* scene = synthetic::find_scene("loop");
   const synthetic::World world = synthetic::world_at(*scene, 0.0, true);
-  synthetic::Workers workers(1);
+  ThreadPool workers(1);
   synthetic::Renderer renderer(k);
   synthetic::IdealImages images;
   int lonely = 0, seen = 0;

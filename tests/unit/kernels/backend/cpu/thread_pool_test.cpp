@@ -20,6 +20,12 @@ TEST(ThreadPool, CallsEveryIndexOnceAndReturnsWhenAllAreDone) {
   }
 }
 
+TEST(ThreadPool, TheNumberOfThreadsIsKeptInRange) {
+  EXPECT_EQ(ThreadPool(0).threads(), 1);
+  EXPECT_EQ(ThreadPool(-4).threads(), 1);
+  EXPECT_EQ(ThreadPool(100).threads(), 64);
+}
+
 TEST(ThreadPool, ManyShortJobsInARowDoNotMixUp) {
   ThreadPool pool(4);
   std::vector<uint32_t> values(64);
