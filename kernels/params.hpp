@@ -43,7 +43,7 @@ struct DepthParams {
 
 /// Registration, paper III-B. Used by the first registration and, with the mask, by the second.
 struct TrackParams {
-  float colour_weight = 0.025f;
+  float colour_weight = 0.05f;
   RobustKernel kernel = RobustKernel::geman_mcclure;
   float huber_depth_m = 0.02f;
   float kernel_coarse_m = 0.06f;
