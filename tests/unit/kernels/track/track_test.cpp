@@ -115,6 +115,7 @@ TEST(PointTerms, GradientsEqualFiniteDifferences) {
 
 TEST(PointTerms, ResidualsWeightsAndCostAreTheEquations) {
   TrackWeights w = weights_of({});
+  w.colour_weight = 0.025f;
   TrackPoint<float> p;
   const float unit_m = w.sdf_unit_m;
   const auto at = [&](float sdf_m, float luma, float measured) {
