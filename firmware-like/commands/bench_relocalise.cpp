@@ -25,6 +25,7 @@
 #include "firmware-like/commands/common.hpp"
 #include "firmware-like/commands/stop_signal.hpp"
 #include "runtime/pipeline/pipeline.hpp"
+#include "runtime/pipeline/pose_quality.hpp"
 #include "runtime/pipeline/relocaliser.hpp"
 #include "runtime/record/truth_frame.hpp"
 
@@ -37,9 +38,8 @@ using synthetic::Scene;
 constexpr double kFrame_s = 1.0 / 30.0;
 constexpr int kTrialFrames = 30;
 constexpr double kDegrees = 57.29577951308232;
-constexpr double kFalse_m = 0.05, kFalse_deg = 3.0;  ///< beyond these an accepted pose is false
-constexpr double kLeastStill = 0.25;                 ///< of the valid pixels of each frame
-constexpr double kMostSeenOfUnseen = 0.1;            ///< of an unseen view that is in the map
+constexpr double kLeastStill = 0.25;       ///< of the valid pixels of each frame
+constexpr double kMostSeenOfUnseen = 0.1;  ///< of an unseen view that is in the map
 constexpr int kMaxDraws = 400;
 
 /// A scene to map, and how many kidnappings into it. The map of a scene whose movers drag the camera along is
@@ -69,7 +69,11 @@ struct Trial {
   ViewCheck check;
   float similarity = 0;
 
-  bool is_false() const { return found && (!seen || error_m > kFalse_m || error_deg > kFalse_deg); }
+  /// Accepted and not a good pose, or accepted where nothing was mapped.
+  bool is_false() const {
+    return found && (!seen || error_m > static_cast<double>(kGoodPoseM) ||
+                     error_deg > static_cast<double>(kGoodPoseDeg));
+  }
   bool good() const { return seen ? found && !is_false() : !found; }
 };
 

@@ -56,6 +56,11 @@ struct CellResidual {
   Vec3 arm;                 ///< camera centre to point, metres, map axes
 };
 
+/// The index of 0..size-1 that is nearest to `i`.
+STILLMAP_HD int32_t nearest_index(int32_t i, int32_t size) {
+  return i < 0 ? 0 : i < size ? i : size - 1;
+}
+
 /// Images of the size of the cell grid.
 struct CellGrid {
   int32_t px = 4;            ///< pixels along the edge of a cell
@@ -218,18 +223,19 @@ struct StillPass {
   }
 
  private:
-  STILLMAP_HD static int32_t inside(int32_t i, int32_t size) { return i < 0 ? 0 : i < size ? i : size - 1; }
-  STILLMAP_HD static int32_t abs_of(int32_t i) { return i < 0 ? -i : i; }
+  STILLMAP_HD static bool near_view(int32_t i, int32_t size) {
+    return i >= -kRimCells && i < size + kRimCells;
+  }
   STILLMAP_HD void look_back(int32_t row, int32_t col, int32_t& frames, float& crept_m) const {
     const Vec3 p = T_before_now * cells.point(row, col);
     if (p.z < kNearestM) return;
     const Pixel at = project(cells.k, p);
     const int32_t at_r = static_cast<int32_t>(floorf(at.v + 0.5f)),
                   at_c = static_cast<int32_t>(floorf(at.u + 0.5f));
-    const int32_t r = inside(at_r, before.depth_m.rows), c = inside(at_c, before.depth_m.cols);
+    if (!near_view(at_r, before.depth_m.rows) || !near_view(at_c, before.depth_m.cols)) return;
+    const int32_t r = nearest_index(at_r, before.depth_m.rows), c = nearest_index(at_c, before.depth_m.cols);
     const bool seen = r == at_r && c == at_c;
-    if (abs_of(r - at_r) > kRimCells || abs_of(c - at_c) > kRimCells || before.depth_m.at(r, c) <= 0.0f)
-      return;
+    if (before.depth_m.at(r, c) <= 0.0f) return;
     const Vec3 was =
         unproject(cells.k, static_cast<float>(c), static_cast<float>(r), before.depth_m.at(r, c));
     // Along the normal: the cell need not be met in its middle.
@@ -263,8 +269,8 @@ struct StaticPixelPass {
   static constexpr float kExpectedTrust = 0.1f;
 
   STILLMAP_HD void operator()(int32_t row, int32_t col) const {
-    const int32_t r = clamped(row / cells.px, cells.depth_m.rows),
-                  c = clamped(col / cells.px, cells.depth_m.cols);
+    const int32_t r = nearest_index(row / cells.px, cells.depth_m.rows),
+                  c = nearest_index(col / cells.px, cells.depth_m.cols);
     const float z_m = depth_m.at(row, col);
     bool dynamic;
     if (mask.data) {
@@ -289,8 +295,6 @@ struct StaticPixelPass {
   }
 
  private:
-  STILLMAP_HD static int32_t clamped(int32_t i, int32_t size) { return i < size ? i : size - 1; }
-
   /// The cell around, or, where its surface is another one, the neighbour whose depth is nearest. Between two
   /// surfaces (a flying pixel) the dynamic one has it.
   STILLMAP_HD bool dynamic_at(int32_t r, int32_t c, float z_m) const {

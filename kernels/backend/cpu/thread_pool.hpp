@@ -7,7 +7,7 @@
 
 namespace stillmap {
 
-/// ThreadPool made at boot; the calling thread works too. Work is a run of indices handed out one by one, so
+/// Workers made at boot; the calling thread works too. Work is a run of indices handed out one by one, so
 /// which thread does which index varies, but never what an index does: results must not depend on the thread.
 class ThreadPool {
  public:
