@@ -23,6 +23,7 @@ struct DepthParams {
   int32_t min_valid_pixels = 3000;
   float noise_m = 0.001f;
   float noise_per_m2 = 0.0015f;
+  float noise_lateral_px = 1.0f;
 
   template <class F>
   static void fields(F&& f) {
@@ -38,6 +39,8 @@ struct DepthParams {
       "with fewer (scaled to the image size) a frame neither moves the pose nor touches the map");
     f("noise_m", &P::noise_m, 0, 0.1, "m", "ours", "standard deviation of a measurement close by");
     f("noise_per_m2", &P::noise_per_m2, 0, 0.1, "1/m", "ours", "and its growth with the square of the depth");
+    f("noise_lateral_px", &P::noise_lateral_px, 0, 10.0, "pixels of 640 columns", "ours",
+      "standard deviation of where on the surface it was taken: matters at grazing angles and edges");
   }
 };
 
@@ -50,7 +53,7 @@ struct TrackParams {
   float kernel_middle_m = 0.03f;
   float kernel_fine_m = 0.015f;
   float kernel_sigmas = 2.0f;
-  float trust_noise_m = 0.01f;
+  float trust_noise_m = 0.015f;
   float trust_area_m = 2.5f;
   float probation_trust = 0.5f;
   int32_t first_finest_level = 1;
@@ -72,6 +75,7 @@ struct TrackParams {
   float prior_floor_rad = 0.002f;
   float prior_reach_m = 0.3f;
   float prior_reach_rad = 0.3f;
+  float second_start_drop = 0.05f;
   float lost_inlier_ratio = 0.2f;
   float poor_inlier_ratio = 0.4f;
   float inlier_m = 0.03f;
@@ -94,9 +98,10 @@ struct TrackParams {
     f("kernel_sigmas", &P::kernel_sigmas, 0, 10.0, "1", "ours",
       "and this many standard deviations of the depth are added to the scale");
     f("trust_noise_m", &P::trust_noise_m, 0, 1.0, "m", "ours",
-      "a point weighs s^2 / (s^2 + noise^2); 0: noise changes no weight");
+      "a point weighs s^2 / (s^2 + variance along the normal); 0: noise changes no weight");
     f("trust_area_m", &P::trust_area_m, 0, 20.0, "m", "ours",
-      "nearer points weigh less, with the square of their depth, as the area that they cover; 0: off");
+      "in the first registration nearer points weigh less, with the square of their depth, as the area that "
+      "they cover, once the map is mask.reabsorb_frames old; 0: off");
     f("probation_trust", &P::probation_trust, 0, 1.0, "1", "ours",
       "in the second registration, of what the map has seen too seldom for its mesh (map.mesh_min_surface)");
     f("first_finest_level", &P::first_finest_level, 0, 2, "level", "ours",
@@ -130,6 +135,9 @@ struct TrackParams {
     f("prior_reach_m", &P::prior_reach_m, 1e-3, 10.0, "m", "ours",
       "no sigma is larger, and no prediction farther from the last pose along an axis");
     f("prior_reach_rad", &P::prior_reach_rad, 1e-3, 3.0, "rad", "ours", "see prior_reach_m");
+    f("second_start_drop", &P::second_start_drop, 0, 1.0, "share", "ours",
+      "when so much less of the picture lies on the map than in the last frame, the registration is tried "
+      "from the last pose as well; 1: never");
     f("lost_inlier_ratio", &P::lost_inlier_ratio, 0, 1.0, "1", "ours",
       "lost below this share of points within inlier_m of the map");
     f("poor_inlier_ratio", &P::poor_inlier_ratio, 0, 1.0, "1", "ours", "poor below this share");
@@ -266,7 +274,7 @@ struct RelocaliseParams {
   float max_unknown = 0.35f;
   float min_luma_correlation = 0.85f;
   float min_texture_correlation = 0.65f;
-  float max_weakest_m = 0.1f;
+  float max_weakest_m = 0.07f;
 
   template <class F>
   static void fields(F&& f) {

@@ -28,6 +28,9 @@ constexpr Contradiction kUnknown = -1.0f;  ///< no measurement, or nothing was e
 /// Of an expected mask: static, but not what the map says; no help to tracking.
 constexpr uint8_t kDoubted = 1;
 
+/// Dynamic, but only for its place: on a bend beside a dynamic part, or what the mask grew over.
+constexpr uint8_t kTouched = 2;
+
 /// From here on a cell counts as contradicting the map.
 constexpr Contradiction kContradicts = 0.5f;
 
@@ -42,12 +45,27 @@ constexpr float kNearestM = 0.05f;  ///< nearer than this nothing is projected
 /// Standard deviation of a depth measurement, metres.
 struct DepthNoise {
   float close_m, per_m2;
+  float lateral_per_m;  ///< of where a ray meets the surface, across the ray, at 1 m
 
   STILLMAP_HD float at(float z_m) const { return close_m + per_m2 * z_m * z_m; }
+  /// Variance of the distance to a surface: along its normal little of the depth's noise is left where it is
+  /// seen at a grazing angle, but there it matters which point of it was met.
+  /// @param cos2 squared cosine between ray and normal
+  STILLMAP_HD float variance_m2(float z_m, float cos2) const {
+    const float along_m = at(z_m), across_m = lateral_per_m * z_m;
+    return cos2 * along_m * along_m + (1.0f - cos2) * across_m * across_m;
+  }
+  /// At an edge of depth, which no surface's slope limits.
+  STILLMAP_HD float edge_variance_m2(float z_m) const {
+    constexpr float kEdgeSlope2 = 4.0f;
+    const float along_m = at(z_m), across_m = lateral_per_m * z_m;
+    return along_m * along_m + kEdgeSlope2 * across_m * across_m;
+  }
 };
 
-inline DepthNoise depth_noise(const DepthParams& params) {
-  return {params.noise_m, params.noise_per_m2};
+inline DepthNoise depth_noise(const DepthParams& params, const Intrinsics& k) {
+  const float px = params.noise_lateral_px * static_cast<float>(k.width) / 640.0f;
+  return {params.noise_m, params.noise_per_m2, px / k.fx};
 }
 
 /// A cell against the map: what it adds to the least squares of its part (paper Eq. (4), at one point).
@@ -73,8 +91,8 @@ struct CellGrid {
   ImageView<uint8_t> fused;     ///< measurements that made the map's surface there; few: it is on probation
   ImageView<float> crept_m;     ///< how far it has gone along its normal in that time
   ImageView<uint8_t> still;     ///< frames that the surface in a cell has been where it is, at most 255
-  ImageView<uint8_t> expected;  ///< kDoubted, or 255: dynamic by the last frame's mask, carried into this one
-  ImageView<uint8_t> dynamic;   ///< 255: dynamic
+  ImageView<uint8_t> dynamic;   ///< 0: static, kTouched, or 255: dynamic
+  ImageView<uint8_t> expected;  ///< kDoubted, or dynamic by the last frame's mask, carried into this one
   ImageView<int32_t> part;      ///< number of the connected part a cell belongs to; < 0: none
 
   STILLMAP_HD Vec3 point(int32_t row, int32_t col) const {
@@ -180,6 +198,7 @@ struct CellEvidencePass {
           fminf(contradict_m + contradict_sigmas * noise.at(z_m), 0.9f * track.map.truncation_m);
       const float off = fabsf(residual.terms.depth_residual_m) / limit_m;
       contradiction = fminf(fmaxf(2.0f * (off - 0.5f), 0.0f), 1.0f);
+      if (contradiction > 0.0f && behind_another(row, col, residual.terms)) contradiction = kUnknown;
       fused = fused_at(track.point_of(static_cast<float>(row), static_cast<float>(col), z_m).cell, cache);
     }
     cells.fused.at(row, col) = fused;
@@ -188,6 +207,13 @@ struct CellEvidencePass {
   }
 
  private:
+  /// Behind a mapped surface that faces elsewhere: it has gone, and says nothing of what is seen now.
+  STILLMAP_HD bool behind_another(int32_t row, int32_t col, const PointTerms<float>& terms) const {
+    constexpr float kSameFacing = 0.5f;
+    const Vec3 facing = track.T_map_cam.rotation * cells.normal.at(row, col), towards = terms.depth_gradient;
+    return terms.depth_residual_m < 0.0f && dot(facing, facing) > 0.5f &&
+           dot(facing, towards) < kSameFacing * norm(towards);
+  }
   /// Measurements on a surface in the voxel next to a point.
   template <class Cache>
   STILLMAP_HD uint8_t fused_at(const GridCell<float>& cell, Cache& cache) const {
@@ -281,8 +307,8 @@ struct StaticPixelPass {
     }
     float t = 255.0f;
     if (trust_noise_m > 0.0f) {
-      const float n = noise.at(z_m), s2 = trust_noise_m * trust_noise_m;
-      t *= s2 / (s2 + n * n);
+      const float s2 = trust_noise_m * trust_noise_m;
+      t *= s2 / (s2 + variance_m2(r, c, z_m));
     }
     if (trust_area_m > 0.0f && !mask.data) {
       const float s = z_m / trust_area_m;
@@ -295,6 +321,12 @@ struct StaticPixelPass {
   }
 
  private:
+  STILLMAP_HD float variance_m2(int32_t r, int32_t c, float z_m) const {
+    const Vec3 normal = cells.normal.at(r, c), ray = cells.point(r, c);
+    const float facing = dot(normal, ray);
+    const bool on_cell = facing != 0.0f && fabsf(cells.depth_m.at(r, c) - z_m) <= depth_edge_m(z_m);
+    return on_cell ? noise.variance_m2(z_m, facing * facing / dot(ray, ray)) : noise.edge_variance_m2(z_m);
+  }
   /// The cell around, or, where its surface is another one, the neighbour whose depth is nearest. Between two
   /// surfaces (a flying pixel) the dynamic one has it.
   STILLMAP_HD bool dynamic_at(int32_t r, int32_t c, float z_m) const {

@@ -20,10 +20,12 @@ bool has_normal(Vec3 n) {
   return dot(n, n) > 0.5f;
 }
 
-/// On a concave bend between the cells two before and two behind it along a row or column.
+/// On a concave bend between the cells two before and two behind it along a row or column; fewer where the
+/// picture ends.
 bool concave(const CellGrid& cells, int32_t r, int32_t c, int32_t dr, int32_t dc, float cos_bend) {
-  const int32_t r0 = r - 2 * dr, c0 = c - 2 * dc, r1 = r + 2 * dr, c1 = c + 2 * dc;
-  if (!cells.depth_m.contains(r0, c0) || !cells.depth_m.contains(r1, c1)) return false;
+  const int32_t rows = cells.depth_m.rows, cols = cells.depth_m.cols;
+  const int32_t r0 = nearest_index(r - 2 * dr, rows), c0 = nearest_index(c - 2 * dc, cols),
+                r1 = nearest_index(r + 2 * dr, rows), c1 = nearest_index(c + 2 * dc, cols);
   const Vec3 n0 = cells.normal.at(r0, c0), n1 = cells.normal.at(r1, c1);
   if (!has_normal(n0) || !has_normal(n1) || dot(n0, n1) > cos_bend) return false;
   return dot(cells.point(r1, c1) - cells.point(r0, c0), n1 - n0) < 0.0f;
@@ -141,8 +143,8 @@ void grow(const CellGrid& cells, const PartMemory& memory, float grow_m) {
       const int32_t reach = std::min(8, static_cast<int32_t>(grow_m * cells.k.fx / z_m + 0.5f));
       for (int32_t nr = std::max(r - reach, 0); nr <= std::min(r + reach, found.rows - 1); ++nr)
         for (int32_t nc = std::max(c - reach, 0); nc <= std::min(c + reach, found.cols - 1); ++nc)
-          if (std::fabs(cells.depth_m.at(nr, nc) - z_m) < grow_m + depth_edge_m(z_m))
-            cells.dynamic.at(nr, nc) = kSet;
+          if (!found.at(nr, nc) && std::fabs(cells.depth_m.at(nr, nc) - z_m) < grow_m + depth_edge_m(z_m))
+            cells.dynamic.at(nr, nc) = kTouched;
     }
 }
 
@@ -192,6 +194,7 @@ void gather_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory
       ++part.cells;
       part.settled += settled(cells, r, c, params);
       part.expected += cells.expected.at(r, c) > kDoubted;
+      part.expected_inside += cells.expected.at(r, c) > kTouched;
       const float area_m2 = cell_area_m2(cells, r, c);
       part.area_m2 += area_m2;
       part.noise_m += noise.at(cells.depth_m.at(r, c));
@@ -337,7 +340,11 @@ void decide(Part& part, const MaskParams& params, float usual, bool believe_move
   const bool contradicts = part.contradicts_m2 >= params.blob_m2 && share > limit;
   const bool stands = static_cast<float>(part.settled) > kSettledShare * static_cast<float>(part.cells);
   part.moved = !stands && believe_moves && has_moved(part, params, usual);
-  part.dynamic = part.moved || (!stands && (contradicts || (was && hardly_known)));
+  // Where the map cannot tell, what was in the mask stays in it; but a surface that comes out from behind a
+  // mover only touched it, and starts small.
+  const bool goes_on =
+      params.warp && hardly_known && 2 * part.expected_inside > part.cells && part.area_m2 >= params.blob_m2;
+  part.dynamic = part.moved || (!stands && (contradicts || goes_on));
 }
 
 }  // namespace
@@ -355,7 +362,8 @@ void decide_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory
   };
   for (int32_t r = 0; r < cells.part.rows; ++r)
     for (int32_t c = 0; c < cells.part.cols; ++c)
-      if (cells.part.at(r, c) >= 0 && part_of(r, c).dynamic) cells.dynamic.at(r, c) = kSet;
+      if (cells.part.at(r, c) >= 0 && part_of(r, c).dynamic)
+        cells.dynamic.at(r, c) = memory.border.at(r, c) ? kTouched : kSet;
   // A thing that was put down makes one part with what it stands on, or with who put it there: what the map
   // knows well stays static, and so does what has settled.
   set_blobs(cells, memory, params.moved_m2, 0, [&](int32_t r, int32_t c) {

@@ -11,6 +11,7 @@ namespace stillmap {
 /// What is known of one connected part of the picture.
 struct Part {
   int32_t cells = 0, expected = 0;
+  int32_t expected_inside = 0;                     ///< without what was only kTouched
   int32_t row0 = 0, row1 = 0, col0 = 0, col1 = 0;  ///< all its cells lie in here, ends excluded
   int32_t settled = 0;                             ///< cells that stood still for mask.reabsorb_frames
   float known = 0, contradicts = 0;       ///< cells with a value in the map; sum of their contradiction

@@ -87,12 +87,26 @@ FrameResult Pipeline::start_map(FrameResult result) {
   return result;
 }
 
+/// From where the camera is expected; when much less of the picture then lies on the map than in the last
+/// frame, from the last pose as well: a camera that turns back suddenly is not where its motion led. From a
+/// wrong start whole surfaces can lie where the map has no value, and nothing pulls them back.
+TrackResult Pipeline::first_registration(const PosePrior& prior) {
+  const auto explained = [](const TrackResult& r) { return r.mapped_ratio * r.inlier_ratio; };
+  TrackResult best = engine_.track(prior.T_world_cam, prior);
+  if (explained(best) < explained_ - config_.track.second_start_drop) {
+    const TrackResult other = engine_.track(cast<float>(T_map_cam_), prior);
+    if (explained(other) > explained(best)) best = other;
+  }
+  explained_ = explained(best);
+  return best;
+}
+
 /// Paper Fig. 2: initial pose, dynamics from its residuals, refined pose, integration.
 FrameResult Pipeline::track_and_map(FrameResult result) {
   StopWatch watch;
   const PredictedPose expected = predictor_.predict(result.stamp);
   const PosePrior prior = prior_from(expected, config_.track);
-  const TrackResult initial = engine_.track(prior.T_world_cam, prior);
+  const TrackResult initial = first_registration(prior);
   result.ms.track_ms = watch.lap_ms();
   const MaskResult mask = engine_.mask(initial.T_world_cam);
   result.ms.mask_ms = watch.lap_ms();

@@ -57,6 +57,7 @@ class Pipeline {
  private:
   FrameResult start_map(FrameResult result);
   FrameResult track_and_map(FrameResult result);
+  TrackResult first_registration(const PosePrior& prior);
   FrameResult find_again(FrameResult result);
   FrameResult go_on_blind(FrameResult result);
   bool blind_too_long(Stamp stamp) const;
@@ -68,6 +69,7 @@ class Pipeline {
   PipelineCounters counters_;
   MotionPredictor predictor_;
   Se3d T_map_cam_;               ///< last pose
+  float explained_ = 0;          ///< share of the valid pixels on the map, last first registration
   Stamp stamp_;                  ///< of the last usable frame
   int64_t frame_period_ns_ = 0;  ///< shortest between two usable frames, 0: not known yet
   bool have_map_ = false;

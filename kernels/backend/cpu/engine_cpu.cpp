@@ -330,15 +330,17 @@ void CpuEngine::make_cells() {
                [&](int32_t first, int32_t last) { loops_.cell_normals(normals, first, last); });
 }
 
-/// Trust of every pixel: from the expected mask before the decision, from the mask after it.
+/// Trust of every pixel: from the expected mask before the decision, from the mask after it. In a young map
+/// nothing is better known than what is near: without it the pose slides along the rest.
 void CpuEngine::write_static_pixels(bool masked) {
+  const bool young = masks_ < static_cast<uint32_t>(params_.mask.reabsorb_frames);
   StaticPixelPass pass{memory_.cells,
                        memory_.depth_m,
                        masked ? memory_.mask : ImageView<uint8_t>{},
                        memory_.trust,
-                       depth_noise(params_.depth),
+                       depth_noise(params_.depth, k()),
                        params_.track.trust_noise_m,
-                       params_.track.trust_area_m,
+                       young ? 0.0f : params_.track.trust_area_m,
                        params_.track.probation_trust,
                        params_.map.mesh_min_surface};
   in_row_tiles(k().height, [&](int32_t first, int32_t last) { loops_.static_pixels(pass, first, last); });
@@ -352,7 +354,7 @@ Se3 moved_about_centre(const Se3& T_map_cam, const Twistd& motion) {
 
 void CpuEngine::mask_by_parts(const Se3& T_map_cam) {
   const CellGrid& cells = memory_.cells;
-  const DepthNoise noise = depth_noise(params_.depth);
+  const DepthNoise noise = depth_noise(params_.depth, k());
   TrackPass track = track_pass(T_map_cam);
   track.k = cells.k;
   set_kernel(params_, 2, track.weights);
@@ -386,7 +388,7 @@ void CpuEngine::remember_cells(const Se3& T_map_cam) {
   std::copy_n(now.luma.data, now.luma.pixels(), before.luma.data);
   std::copy_n(now.crept_m.data, now.crept_m.pixels(), before.crept_m.data);
   for (int32_t i = 0; i < now.dynamic.pixels(); ++i)
-    before.dynamic.data[i] = now.dynamic.data[i]                    ? kMasked
+    before.dynamic.data[i] = now.dynamic.data[i]                    ? now.dynamic.data[i]
                              : now.evidence.data[i] >= kContradicts ? kDoubted
                                                                     : uint8_t{0};
   std::copy_n(now.still.data, now.still.pixels(), before.still.data);

@@ -21,6 +21,7 @@ class EvidenceTest : public testing::Test {
     cells.depth_m = image(depth, 0.0f);
     std::copy(view.depth_m.begin(), view.depth_m.end(), depth.begin());
     cells.luma = image(luma, 20000.0f);
+    cells.normal = image(normal, Vec3{0, 0, -1});
     cells.residual = image(residual, CellResidual{});
     cells.evidence = image(evidence, kUnknown);
     cells.fused = image(fused, uint8_t{255});
@@ -35,7 +36,7 @@ class EvidenceTest : public testing::Test {
                           0.03f,
                           RobustKernel::huber,
                           0.02f};
-    pass.noise = {0.001f, 0.0015f};
+    pass.noise = {0.001f, 0.0015f, 0.0f};
     pass.contradict_m = 0.05f;
     pass.contradict_sigmas = 2.0f;
   }
@@ -55,6 +56,7 @@ class EvidenceTest : public testing::Test {
   AnalyticMap map;
   test::CornerView view;
   std::vector<float> depth, luma;
+  std::vector<Vec3> normal;
   std::vector<CellResidual> residual;
   std::vector<Contradiction> evidence;
   std::vector<uint8_t> fused;
@@ -73,6 +75,19 @@ TEST_F(EvidenceTest, WellBeforeTheSurfaceItDoesInFull) {
   cells.depth_m.at(kRow, kCol) -= 0.075f;
   look(kRow, kCol);
   EXPECT_EQ(cells.evidence.at(kRow, kCol), 1.0f);
+}
+
+TEST_F(EvidenceTest, BehindAMappedSurfaceOnlyOneThatFacesTheSameWayContradicts) {
+  const Vec3 point = cells.point(kRow, kCol);
+  look(kRow, kCol);
+  const Vec3 outward = normalized(cells.residual.at(kRow, kCol).terms.depth_gradient);
+  cells.depth_m.at(kRow, kCol) += 0.075f;
+  cells.normal.at(kRow, kCol) = outward;  // the same surface, moved away
+  look(kRow, kCol);
+  EXPECT_EQ(cells.evidence.at(kRow, kCol), 1.0f);
+  cells.normal.at(kRow, kCol) = normalized(cross(outward, point));  // another one: that before it has gone
+  look(kRow, kCol);
+  EXPECT_EQ(cells.evidence.at(kRow, kCol), kUnknown);
 }
 
 TEST_F(EvidenceTest, WhereNothingWasEverSeenNobodyKnows) {

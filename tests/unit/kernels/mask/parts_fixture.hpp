@@ -25,6 +25,7 @@ class PartsTest : public testing::Test {
   PartsTest() {
     cells.px = 1;
     cells.k = {80, 80, 40, 30, kCols, kRows};
+    noise = depth_noise({}, cells.k);
     cells.depth_m = image(depth, kWallM);
     cells.luma = image(luma, 20000.0f);
     cells.normal = image(normal, Vec3{0, 0, -1});
@@ -97,7 +98,7 @@ class PartsTest : public testing::Test {
   CellsBefore before;
   PartMemory memory;
   MaskParams params;
-  DepthNoise noise = depth_noise({});
+  DepthNoise noise;
   float usual = 1.0f;
 
  private:

@@ -19,7 +19,7 @@ class ScriptedEngine : public Engine {
   TrackResult track(const Se3& T_start, const PosePrior&) override {
     calls += 't';
     track_start = T_start;
-    return tracked;
+    return calls == "ptt" ? tracked_again : tracked;
   }
   MaskResult mask(const Se3& T) override {
     calls += 'm';
@@ -63,6 +63,7 @@ class ScriptedEngine : public Engine {
   std::string calls;  ///< first letters, in order
   Status prepare_status = Status::ok;
   TrackResult tracked, refined;
+  TrackResult tracked_again;  ///< by a second call for the same frame
   int32_t masked_pixels = 0, keyframes = 0;
   PlaceResult place;
   Se3 find_guess;
@@ -378,6 +379,31 @@ TEST_F(PipelineTest, NoMotionIsContinuedOverALossOrAStampThatJumpsBack) {
   process(pipeline, 620);
   EXPECT_EQ(engine_.track_start.translation.x, 0.4f);  // the way out of the loss is no motion
   EXPECT_TRUE(std::isfinite(from_lost_x));
+}
+
+TEST_F(PipelineTest, WhenLessOfThePictureFitsTheLastPoseIsTriedAsWell) {
+  config_.track.second_start_drop = 0.05f;
+  Pipeline pipeline(engine_, config_);
+  process(pipeline, 0);
+  engine_.tracked.mapped_ratio = 0.95f;
+  answer(at(0.1f));
+  process(pipeline, 40);
+  engine_.tracked.mapped_ratio = 0.91f;  // a little less is nothing
+  process(pipeline, 80);
+  EXPECT_EQ(engine_.calls, "ptmi");
+  engine_.tracked.mapped_ratio = 0.8f;
+  engine_.tracked.T_world_cam = at(0.3f);
+  engine_.tracked_again = engine_.tracked;
+  engine_.tracked_again.T_world_cam = at(0.11f);
+  engine_.tracked_again.mapped_ratio = 0.94f;
+  process(pipeline, 120);
+  EXPECT_EQ(engine_.calls, "pttmi");
+  EXPECT_EQ(engine_.track_start.translation.x, 0.1f);
+  EXPECT_EQ(engine_.mask_pose.translation.x, 0.11f);
+  engine_.tracked_again.mapped_ratio = 0.7f;  // no better: the first answer stands
+  process(pipeline, 160);
+  EXPECT_EQ(engine_.calls, "pttmi");
+  EXPECT_EQ(engine_.mask_pose.translation.x, 0.3f);
 }
 
 }  // namespace
