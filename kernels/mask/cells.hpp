@@ -63,6 +63,7 @@ struct DepthNoise {
   }
 };
 
+/// @param k of the full picture: a lateral pixel is one of 640 columns
 inline DepthNoise depth_noise(const DepthParams& params, const Intrinsics& k) {
   const float px = params.noise_lateral_px * static_cast<float>(k.width) / 640.0f;
   return {params.noise_m, params.noise_per_m2, px / k.fx};
@@ -321,6 +322,7 @@ struct StaticPixelPass {
   }
 
  private:
+  /// Of the distance of a pixel in cell (r, c) to its surface.
   STILLMAP_HD float variance_m2(int32_t r, int32_t c, float z_m) const {
     const Vec3 normal = cells.normal.at(r, c), ray = cells.point(r, c);
     const float facing = dot(normal, ray);
