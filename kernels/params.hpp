@@ -227,7 +227,7 @@ struct IntegrateParams {
     f("through_movers", &P::through_movers, 0, 1, "bool", "ours",
       "what lies before a dynamic point is seen free, too; false: masked pixels change nothing (III-D)");
     f("relearn", &P::relearn, 0, 1, "bool", "ours",
-      "a static surface in space that was free halves the weight of what was there");
+      "what was there is soon forgotten where a static surface stands in free space or is seen through");
   }
 };
 

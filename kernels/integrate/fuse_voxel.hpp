@@ -35,6 +35,9 @@ struct FrameGeometry {
 constexpr float kRelearnFactor = 0.25f;
 constexpr float kFreeShare = 0.3f;  ///< of tau
 constexpr float kMoverGap = 0.4f;   ///< of tau: this far before a mover space is free
+// A surface that is seen through: each look also forgets a tenth, at least one observation. What was seen
+// there for long is gone in as few looks as what was seen shortly.
+constexpr float kSeenThroughFactor = 0.9f;
 
 /// Projective signed distance along the optical axis: measured depth minus depth of the voxel.
 ///                                                                       test: integrate_test
@@ -94,7 +97,7 @@ struct VoxelState {
 struct FuseWeights {
   float units_per_m = 0;  ///< of VoxelSurface::sdf
   float weight_cap = 64;
-  bool relearn = false;  ///< a surface well inside what was free halves the weight
+  bool relearn = false;  ///< what changed soon outweighs what was there
 };
 
 /// Weighted running means of distance and colour of a voxel (paper III-A), and carving (III-D): in free space
@@ -112,7 +115,12 @@ STILLMAP_HD VoxelState<F> fused(VoxelState<F> v, const Observation<F>& o, F luma
   const F observed = select(o.band, o.sdf_m * F(p.units_per_m), tau);
   if (p.relearn) {
     const MaskOf<F> was_free = (old > F(kFreeShare) * tau) & (old - observed > F(kFreeShare) * tau);
-    v.weight = select(o.band & was_free, to_float(to_int(F(kRelearnFactor) * v.weight)), v.weight);
+    const MaskOf<F> was_surface = old < F(kFreeShare) * tau;
+    const auto forget = [&](MaskOf<F> changed, float factor) {
+      v.weight = select(changed, to_float(to_int(F(factor) * v.weight)), v.weight);
+    };
+    forget(o.band & was_free, kRelearnFactor);
+    forget(o.free & was_surface, kSeenThroughFactor);
   }
   const F mean = round_nearest(old + (observed - old) / (v.weight + one));
   const F sdf = select(o.band, mean, min_of(max_of(mean, old + one), tau));

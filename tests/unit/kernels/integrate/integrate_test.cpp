@@ -228,6 +228,26 @@ TEST(Fused, RelearningTurnsAFreeVoxelAtOnceAndLeavesASurfaceAlone) {
   EXPECT_EQ(known.weight, 64.0f);
 }
 
+TEST(Fused, RelearningCarvesASurfaceThatIsSeenThroughInFewLooks) {
+  FuseWeights quick = kWeights;
+  quick.relearn = true;
+  const float tau = static_cast<float>(kSdfMax);
+  const auto looks_until_free = [&](const FuseWeights& weights, float start) {
+    VoxelState<float> v = {start, 0, 64, 64, 128, 128};
+    int looks = 0;
+    for (; v.sdf < kFreeShare * tau && looks < 1000; ++looks)
+      v = fused(v, kFree, 0.0f, 0.0f, 0.0f, weights, 0.0f);
+    return looks;
+  };
+  EXPECT_GT(looks_until_free(kWeights, -0.5f * tau), 40);
+  EXPECT_LT(looks_until_free(quick, -0.5f * tau), 20);
+  // One look through the edge of a surface does not hurt it.
+  VoxelState<float> edge = {0.0f, 0, 64, 64, 128, 128};
+  edge = fused(edge, kFree, 0.0f, 0.0f, 0.0f, quick, 0.0f);
+  EXPECT_LT(edge.sdf, 0.02f * tau);
+  EXPECT_EQ(edge.weight, 58.0f);
+}
+
 TEST(Fused, AFreeVoxelThatIsFoundOccupiedTurnsWithinTheCap) {
   VoxelState<float> v = {static_cast<float>(kSdfMax), 0, 64, 0, 128, 128};
   int frames = 0;
