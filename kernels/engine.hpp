@@ -108,6 +108,13 @@ struct ViewCheck {
   float weakest_m = 0;  ///< standard deviation of the worst bound direction for 1 cm of noise in every cell
 };
 
+/// What the map knows of a point, by the voxel next to it.
+enum class PointState : uint8_t {
+  unknown,
+  free,     ///< seen free, or before a surface
+  occupied  ///< on a surface, or behind it by less than tau
+};
+
 /// An answer of the search for a lost camera.
 struct PlaceResult {
   Status status =
@@ -160,6 +167,17 @@ class Engine {
                          ImageView<Rgb8> colour) = 0;
   /// Welded coloured mesh of the zero level, same bytes for the same map.
   virtual Status extract_mesh(MeshSink& sink) = 0;
+
+  /// @param states as many as points (map frame, metres)
+  virtual void look_up(View<const Vec3> points_map_m, View<PointState> states) const = 0;
+  /// The map in pieces (kernels/map/group_record.hpp), to be saved, archived or copied.
+  /// @return how many there are; as many of their keys as fit, ascending when all fit
+  virtual uint32_t list_groups(View<uint64_t> keys) const = 0;
+  /// @return bytes of the record; 0: there is no such group, or it does not fit
+  virtual uint32_t write_group(uint64_t key, View<uint8_t> record) const = 0;
+  /// Puts a group into the map, in place of what is known there.
+  /// @return bad_data: not a record; capacity_exhausted: no room, nothing was changed
+  virtual Status read_group(View<const uint8_t> record) = 0;
 
   /// 255: dynamic. Size of the camera; valid until the next `prepare`.
   virtual ImageView<const uint8_t> mask_image() const = 0;

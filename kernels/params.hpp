@@ -12,6 +12,7 @@ namespace stillmap {
 enum class InvalidDepth : uint8_t { ignore, complete };
 enum class RobustKernel : uint8_t { huber, geman_mcclure };
 enum class MaskMethod : uint8_t { residual, parts };
+enum class FreeSpace : uint8_t { dense, hierarchical };
 enum class MotionPrior : uint8_t { last_pose, constant_velocity, odometry };
 
 /// Depth image to metres, paper III-E.
@@ -235,6 +236,7 @@ struct IntegrateParams {
 struct MapParams {
   float voxel_m = 0.01f;
   float truncation_m = 0.1f;
+  FreeSpace free_space = FreeSpace::dense;
   int32_t pool_blocks = 110000;
   float high_water = 0.98f;
   int32_t mesh_min_weight = 3;
@@ -245,6 +247,8 @@ struct MapParams {
     using P = MapParams;
     f("voxel_m", &P::voxel_m, 1e-3, 0.5, "m", "Tab. I", "edge of a voxel");
     f("truncation_m", &P::truncation_m, 4e-3, 2.0, "m", "Tab. I", "tau; at least 4 voxels");
+    f("free_space", &P::free_space, 0, 1, "dense|hierarchical", "III-D",
+      "the truncation distance in every free voxel, or free blocks and groups of blocks without voxels");
     f("pool_blocks", &P::pool_blocks, 1, 4000000, "blocks of 4 kB", "ours",
       "fixed at boot; the hash table has twice as many slots or more");
     f("high_water", &P::high_water, 0.1, 1.0, "share", "ours",

@@ -12,6 +12,8 @@ int bench(const BenchOptions& o) {
   if (o.what == "steps") return bench_steps(o);
   if (o.what == "accuracy") return bench_accuracy(o);
   if (o.what == "relocalise") return bench_relocalise(o);
+  if (o.what == "scale") return bench_scale(o);
+  if (o.what == "free_space") return bench_free_space(o);
   return fail("bench " + o.what + ": this part is not in this build", ErrorKind::bad_usage);
 }
 
@@ -20,26 +22,27 @@ int bench(const BenchOptions& o) {
 void add_bench(CLI::App& app, int& exit_code) {
   CLI::App* command = app.add_subcommand("bench", "how fast and how accurate this build is on this machine");
   auto o = std::make_shared<BenchOptions>();
-  command->add_option("WHAT", o->what, "steps, accuracy, relocalise, scale or soak")
-      ->check(CLI::IsMember({"steps", "accuracy", "relocalise", "scale", "soak"}))
+  command->add_option("WHAT", o->what, "steps, accuracy, relocalise, scale, free_space or soak")
+      ->check(CLI::IsMember({"steps", "accuracy", "relocalise", "scale", "free_space", "soak"}))
       ->capture_default_str();
   command->add_flag("--json", o->json, "machine-readable");
   command->add_option("--config", o->configs, "TOML file; accuracy: may be repeated, without it both presets")
       ->allow_extra_args(false);
   command->add_option("--set", o->settings, "section.key=value; may be repeated")->allow_extra_args(false);
   command
-      ->add_option("--source", o->sources,
-                   "steps: what to time; accuracy: only these, may be repeated (a recording as "
-                   "SOURCE@SKIP+MAX is cut)")
+      ->add_option(
+          "--source", o->sources,
+          "steps, scale: what to time; accuracy, free_space: only these, may be repeated (a recording as "
+          "SOURCE@SKIP+MAX is cut)")
       ->allow_extra_args(false);
-  command->add_option("--frames", o->frames, "steps: how many frames to preload")
+  command->add_option("--frames", o->frames, "steps, scale: how many frames to preload")
       ->check(CLI::Range(2, 2000))
       ->capture_default_str();
   command->add_option("--seeds", o->seeds, "accuracy: runs of each synthetic scene, seed 1, 2, ...")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  command->add_option("--size", o->size, "accuracy: WxH of the synthetic scenes");
-  command->add_option("--seconds", o->seconds, "accuracy: length of the synthetic scenes");
+  command->add_option("--size", o->size, "accuracy, free_space: WxH of the synthetic scenes");
+  command->add_option("--seconds", o->seconds, "accuracy, free_space: length of the synthetic scenes");
   command->add_flag("--twins", o->twins, "accuracy: also the static twin of each --source that moves");
   command->add_option("--skip-frames", o->skip_frames, "accuracy: pass over the first frames of recordings");
   command->add_option("--max-frames", o->max_frames,

@@ -31,4 +31,10 @@ int bench_accuracy(const BenchOptions& options);
 /// Kidnappings to seen and unseen places. @return the exit code; failed when a bar is missed
 int bench_relocalise(const BenchOptions& options);
 
+/// The time of a frame beside 1, 10 and 50 copies of its map. @return the exit code; failed above 1.1 times
+int bench_scale(const BenchOptions& options);
+
+/// What both forms of free space know and take. @return the exit code; failed when a bar is missed
+int bench_free_space(const BenchOptions& options);
+
 }  // namespace stillmap

@@ -31,18 +31,6 @@ constexpr size_t kStepCount = std::size(kSteps);
 
 using Histograms = std::array<DurationHistogram, kStepCount>;
 
-/// Reads up to `count` usable frames. Decoding and rendering must not disturb the measurement.
-std::vector<std::unique_ptr<FrameSlot>> preload(FrameSource& source, int32_t count) {
-  std::vector<std::unique_ptr<FrameSlot>> slots;
-  while (static_cast<int32_t>(slots.size()) < count && !stop_requested()) {
-    auto slot = std::make_unique<FrameSlot>(source.info());
-    const Status status = source.next(slot->frame(), 1000);
-    if (status == Status::ok) slots.push_back(std::move(slot));
-    if (status == Status::end || status == Status::unavailable) break;
-  }
-  return slots;
-}
-
 void print_json(const Histograms& times, const std::string& source, size_t frames, int32_t threads) {
   nlohmann::ordered_json json = {
       {"source", source}, {"frames", frames}, {"threads", threads}, {"ms", nullptr}};
@@ -81,7 +69,7 @@ int bench_steps(const BenchOptions& o) {
   if (!engine)
     return fail("the memory of the engine cannot be had; lower map.pool_blocks", ErrorKind::failed);
 
-  const auto slots = preload(**source, o.frames);
+  const FrameSlots slots = preload(**source, o.frames);
   if (slots.size() < 2) return fail(name + ": fewer than two usable frames", ErrorKind::failed);
   Pipeline pipeline(*engine, *config);
   Histograms times;

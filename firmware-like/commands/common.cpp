@@ -5,6 +5,7 @@
 #include "config/load.hpp"
 #include "config/validate.hpp"
 #include "firmware-like/commands/command.hpp"
+#include "firmware-like/commands/stop_signal.hpp"
 
 namespace stillmap {
 
@@ -66,6 +67,17 @@ FrameSlot::FrameSlot(const SourceInfo& info) {
   if (!info.has_truth_mask) return;
   truth_mask_.resize(pixels);
   frame_.truth_mask = {truth_mask_.data(), rows, cols, cols};
+}
+
+FrameSlots preload(FrameSource& source, int32_t count) {
+  FrameSlots slots;
+  while (static_cast<int32_t>(slots.size()) < count && !stop_requested()) {
+    auto slot = std::make_unique<FrameSlot>(source.info());
+    const Status status = source.next(slot->frame(), 1000);
+    if (status == Status::ok) slots.push_back(std::move(slot));
+    if (status == Status::end || status == Status::unavailable) break;
+  }
+  return slots;
 }
 
 }  // namespace stillmap

@@ -38,4 +38,8 @@ class FrameSlot {
   RgbdFrame frame_;
 };
 
+using FrameSlots = std::vector<std::unique_ptr<FrameSlot>>;
+/// Reads up to `count` usable frames: decoding and rendering must not disturb a measurement.
+FrameSlots preload(FrameSource& source, int32_t count);
+
 }  // namespace stillmap

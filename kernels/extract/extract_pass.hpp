@@ -45,7 +45,7 @@ struct ExtractPass {
     const Int3 block = unpack(map.block_keys[id]);
     uint32_t sides = classes[id];
     for (int32_t i = 1; i < 8 && sides != (kHasInside | kHasOutside); ++i) {
-      const BlockId upper = map.table.find(pack(block + Int3{i & 1, i >> 1 & 1, i >> 2}));
+      const BlockId upper = map.voxels_of(block + Int3{i & 1, i >> 1 & 1, i >> 2});
       if (upper != kNoBlock) sides |= classes[upper];
     }
     return sides == (kHasInside | kHasOutside);
@@ -78,7 +78,7 @@ struct ExtractPass {
     uint32_t at = 0;
     for (int32_t axis = 0; axis < 3; ++axis) {
       const Int3 step = {axis == 0, axis == 1, axis == 2};
-      const BlockId upper_id = map.table.find(pack(block + step));
+      const BlockId upper_id = map.voxels_of(block + step);
       const VoxelBlock* upper = upper_id == kNoBlock ? nullptr : &map.blocks[upper_id];
       for (int32_t z = 0; z < kBlockEdge; ++z) {
         int32_t i = 0;
@@ -151,7 +151,7 @@ struct ExtractPass {
       CellRows cells;
       analyse(block + offset, rows, cells, owner.edges);
       rank_edges(owner.edges, owner.ranks);
-      owner.first_vertex = first_vertex[map.table.find(pack(block + offset))];
+      owner.first_vertex = first_vertex[map.voxels_of(block + offset)];
       owner.known = true;
     }
     const int32_t z = voxel.z & 7;

@@ -39,11 +39,11 @@ STILLMAP_HD uint32_t count_bits(uint64_t x) {
 namespace cells_detail {
 
 /// Adds `count` voxels of a row from voxel `first` of the block, the first of them to bit `bit`.
-STILLMAP_HD void add_voxels(const VolumeView& map, const VoxelBlock& block, int32_t first, int32_t count,
+STILLMAP_HD void add_voxels(const VolumeView& map, const BlockAt& block, int32_t first, int32_t count,
                             int32_t bit, uint32_t& observed, uint32_t& inside, uint32_t& far) {
   for (int32_t i = first; i < first + count; ++i, ++bit) {
-    const int16_t sdf = block.surface[i].sdf;
-    const VoxelRecord record = block.record[i];
+    const int16_t sdf = block.surface(i).sdf;
+    const VoxelRecord record = block.record(i);
     const bool enough =
         record.weight >= map.mesh_min_weight && (record.colour_weight >= map.mesh_min_surface || is_far(sdf));
     observed |= static_cast<uint32_t>(enough) << bit;
@@ -62,20 +62,16 @@ STILLMAP_HD int32_t neighbour_of(int32_t coordinate) {
 /// Reads block `block` and the voxels around it; absent blocks, and voxels that were not seen often enough
 /// (map.mesh_min_weight, map.mesh_min_surface), are unobserved.
 STILLMAP_HD void read_rows(const VolumeView& map, Int3 block, VoxelRows& rows) {
-  const VoxelBlock* around[27];
-  for (int32_t i = 0; i < 27; ++i) {
-    const BlockId id = map.table.find(pack(block + Int3{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1}));
-    around[i] = id == kNoBlock ? nullptr : &map.blocks[id];
-  }
+  BlockAt around[27];
+  for (int32_t i = 0; i < 27; ++i) around[i] = map.read(block + Int3{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1});
   for (int32_t z = -1; z <= kBlockEdge; ++z)
     for (int32_t y = -1; y <= kBlockEdge; ++y) {
-      const VoxelBlock* const* row =
-          around + 3 * cells_detail::neighbour_of(y) + 9 * cells_detail::neighbour_of(z);
+      const BlockAt* row = around + 3 * cells_detail::neighbour_of(y) + 9 * cells_detail::neighbour_of(z);
       const int32_t first = voxel_index(0, y & 7, z & 7);
       uint32_t observed = 0, inside = 0, far = 0;
-      if (row[0]) cells_detail::add_voxels(map, *row[0], first + 7, 1, 0, observed, inside, far);
-      if (row[1]) cells_detail::add_voxels(map, *row[1], first, 8, 1, observed, inside, far);
-      if (row[2]) cells_detail::add_voxels(map, *row[2], first, 1, 9, observed, inside, far);
+      if (row[0]) cells_detail::add_voxels(map, row[0], first + 7, 1, 0, observed, inside, far);
+      if (row[1]) cells_detail::add_voxels(map, row[1], first, 8, 1, observed, inside, far);
+      if (row[2]) cells_detail::add_voxels(map, row[2], first, 1, 9, observed, inside, far);
       rows.observed[z + 1][y + 1] = static_cast<uint16_t>(observed);
       rows.inside[z + 1][y + 1] = static_cast<uint16_t>(inside);
       rows.far[z + 1][y + 1] = static_cast<uint16_t>(far);

@@ -6,14 +6,20 @@
 
 namespace stillmap {
 
-/// One entry of the list of visible blocks: id, and in the top bit whether all of the block is seen free.
+/// One entry of the list of visible blocks: id, and in the top bits whether all of the block is seen free, or
+/// whether it is the id of SeenVoxels.
 struct VisibleBlock {
   uint32_t bits;
 
-  static constexpr uint32_t kFree = 1u << 31;
-  STILLMAP_HD BlockId id() const { return bits & ~kFree; }
+  static constexpr uint32_t kFree = 1u << 31, kPartly = 1u << 30;
+  STILLMAP_HD uint32_t id() const { return bits & ~(kFree | kPartly); }
   STILLMAP_HD bool all_free() const { return (bits & kFree) != 0; }
+  STILLMAP_HD bool partly() const { return (bits & kPartly) != 0; }
 };
+
+/// VolumeView::settled_free of a block without a surface: all its voxels are free or unobserved. It can do
+/// without voxels.
+constexpr uint8_t kNoSurfaceLeft = 2;
 
 /// Fuses one frame into one visible block: distance, colour, free space and carving (paper III-A, III-D).
 ///
@@ -24,13 +30,15 @@ struct IntegratePass {
   const LumaChroma* colour;  ///< same pixels as geometry.static_depth_m
   Se3 T_cam_map;
   FuseWeights weights;
-  bool free_space;  ///< false: a voxel that was never in the band stays unobserved
-  int32_t frame;    ///< counts frames, for the dither
+  bool free_space;    ///< false: a voxel that was never in the band stays unobserved
+  int32_t frame;      ///< counts frames, for the dither
+  bool dense = true;  ///< false: blocks in which no surface is left are told (kNoSurfaceLeft)
 
   template <class Voxels>
   STILLMAP_HD void operator()(VisibleBlock visible, const Voxels& voxels) const {
     using F = typename Voxels::Number;
     const BlockId id = visible.id();
+    if (visible.partly()) return mark_seen(map.partly[id], voxels);
     if (visible.all_free() && map.settled_free[id]) return;
     VoxelBlock& block = map.blocks[id];
     const VoxelGrid grid(T_cam_map, unpack(map.block_keys[id]), map.voxel_m);
@@ -54,10 +62,32 @@ struct IntegratePass {
                                            (state.weight < F(weights.weight_cap)));
           touched_band |= band;
         }
-    if (visible.all_free())
+    if (!dense)
+      map.settled_free[id] = !touched_band && no_surface_left(block) ? kNoSurfaceLeft : uint8_t{0};
+    else if (visible.all_free())
       map.settled_free[id] = settled;
     else if (touched_band)
       map.settled_free[id] = 0;
+  }
+
+ private:
+  STILLMAP_HD static bool no_surface_left(const VoxelBlock& block) {
+    int32_t surface = 0;
+    for (const VoxelSurface& v : block.surface)
+      surface |= static_cast<int32_t>(v.sdf != kSdfMax) & static_cast<int32_t>(v.sdf != kSdfUnobserved);
+    return surface == 0;
+  }
+
+  template <class Voxels>
+  STILLMAP_HD void mark_seen(SeenVoxels& seen, const Voxels& voxels) const {
+    using F = typename Voxels::Number;
+    const VoxelGrid grid(T_cam_map, unpack(seen.key), map.voxel_m);
+    for (int32_t z = 0; z < kBlockEdge; ++z)
+      for (int32_t y = 0; y < kBlockEdge; ++y)
+        for (int32_t x = 0; x < kBlockEdge; x += Voxels::kCount) {
+          const Observation<F> o = observe(geometry, grid.position<F>(voxels.ramp(x), y, z));
+          seen.layer[z] |= static_cast<uint64_t>(voxels.bits(o.free)) << (kBlockEdge * y + x);
+        }
   }
 };
 
@@ -68,6 +98,7 @@ struct PlainVoxels {
 
   STILLMAP_HD bool all() const { return true; }
   STILLMAP_HD bool any(bool which) const { return which; }
+  STILLMAP_HD uint32_t bits(bool which) const { return which; }
   STILLMAP_HD float ramp(int32_t x) const { return static_cast<float>(x); }
   STILLMAP_HD int32_t index(int32_t i) const { return i; }
   STILLMAP_HD VoxelState<float> load(const VoxelBlock& block, int32_t i) const {

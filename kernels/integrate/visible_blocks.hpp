@@ -57,13 +57,11 @@ STILLMAP_HD CubeGeometry cube_geometry(int32_t voxels, float voxel_m) {
   return {{half_m, half_m, half_m}, 1.7320509f * half_m};
 }
 
-constexpr int32_t kGroupEdge = 4;  ///< blocks along an edge of a group: 64 blocks, one bit each
-constexpr int32_t kGroupBlocks = kGroupEdge * kGroupEdge * kGroupEdge;
-
 /// What a frame does to one group of blocks: a bit a block.
 struct GroupView {
-  uint64_t free = 0;
-  uint64_t mixed = 0;
+  uint64_t free = 0;    ///< all of the block is seen free, and that says something new
+  uint64_t mixed = 0;   ///< needs voxels
+  uint64_t partly = 0;  ///< has no voxels and needs none: some of it is seen free
 };
 
 /// Classifies the blocks of one group (4x4x4).
@@ -72,55 +70,91 @@ struct VisibleGroupPass {
   FrameGeometry geometry;
   DepthRangePyramid ranges;
   Se3 T_cam_map;
-  Int3 first_group;  ///< group coordinates of the first group of the box that encloses the view
-  Int3 groups;       ///< extent of that box
-  bool free_space;   ///< false: free space is not stored, only what is in the map is carved
+  Int3 first_group;      ///< group coordinates of the first group of the box that encloses the view
+  Int3 groups;           ///< extent of that box
+  bool free_space;       ///< false: free space is not stored, only what is in the map is carved
+  bool dense = true;     ///< free space is stored in voxels (paper III-D)
+  uint32_t enough = 64;  ///< looks at a free block without voxels, after which more say nothing new
 
   STILLMAP_HD Int3 group_at(uint32_t index) const {
     const int32_t i = static_cast<int32_t>(index);
     return first_group + Int3{i % groups.x, i / groups.x % groups.y, i / (groups.x * groups.y)};
   }
   STILLMAP_HD Int3 block_at(uint32_t group_index, int32_t bit) const {
-    const Int3 g = group_at(group_index);
-    return {g.x * kGroupEdge + (bit & 3), g.y * kGroupEdge + (bit >> 2 & 3), g.z * kGroupEdge + (bit >> 4)};
+    return block_in_group(group_at(group_index), bit);
   }
 
   /// @param voxels how voxels are taken: PlainVoxels, or a row of them (backend/cpu)
   template <class Voxels>
   STILLMAP_HD GroupView operator()(uint32_t group_index, const Voxels& voxels) const {
     GroupView view;
-    const CubeGeometry group = cube_geometry(kGroupEdge * kBlockEdge, map.voxel_m);
-    const CubeGeometry block = cube_geometry(kBlockEdge, map.voxel_m);
-    if (look(block_at(group_index, 0), group) == BlockView::nothing) return view;
+    const Int3 at = group_at(group_index);
+    const BlockView whole = look(block_in_group(at, 0), cube_geometry(kGroupEdge * kBlockEdge, map.voxel_m));
+    if (whole == BlockView::nothing) return view;
+    const CubeGeometry cube = cube_geometry(kBlockEdge, map.voxel_m);
+    const BlockRef group = map.table.find(pack(at));
+    if (whole == BlockView::free && settled(group)) return view;
     for (int32_t bit = 0; bit < kGroupBlocks; ++bit) {
-      const Int3 b = block_at(group_index, bit);
-      const BlockView seen = look(b, block);
-      const uint64_t flag = 1ull << bit;
-      if (seen == BlockView::free && (free_space || map.table.find(pack(b)) != kNoBlock)) view.free |= flag;
-      // A block that is not in the map yet is made only when the frame has something to say about one of its
-      // voxels.
-      if (seen == BlockView::mixed && (map.table.find(pack(b)) != kNoBlock || concerns(b, voxels)))
-        view.mixed |= flag;
+      const Int3 block = block_in_group(at, bit);
+      const BlockRef ref = has_id(group) ? map.groups[group].block[bit] : group;
+      const BlockView seen = whole == BlockView::free ? whole : look(block, cube);
+      if (seen != BlockView::nothing) add(1ull << bit, seen, block, ref, voxels, view);
     }
     return view;
   }
 
  private:
+  STILLMAP_HD bool settled(BlockRef ref) const { return is_free(ref) && payload(ref) >= enough; }
+
+  template <class Voxels>
+  STILLMAP_HD void add(uint64_t flag, BlockView seen, Int3 block, BlockRef ref, const Voxels& voxels,
+                       GroupView& view) const {
+    if (seen == BlockView::free) {
+      if ((free_space || has_id(ref)) && !settled(ref)) view.free |= flag;
+      return;
+    }
+    if (has_id(ref)) {
+      view.mixed |= flag;
+      return;
+    }
+    // Voxels are made only where the frame has something to say about one of them.
+    const VoxelsSeen what = look_at_voxels(block, voxels);
+    if (what.band || (dense && what.any_free && free_space))
+      view.mixed |= flag;
+    else if (what.any_free && free_space && !settled(ref))
+      add_free(flag, what.all_free, is_free(ref), view);
+  }
   STILLMAP_HD BlockView look(Int3 block, const CubeGeometry& cube) const {
     const Vec3 p_map = voxel_position(first_voxel(block), map.voxel_m) + cube.centre_offset_m;
     return classify(geometry, ranges, T_cam_map * p_map, cube.radius_m);
   }
+  /// A block without voxels of which some is seen free; more than all of it cannot be told of a free one.
+  STILLMAP_HD static void add_free(uint64_t flag, bool all_free, bool known_free, GroupView& view) {
+    if (all_free)
+      view.free |= flag;
+    else if (!known_free)
+      view.partly |= flag;
+  }
+
+  /// What the frame says of the voxels of a block, as far as it matters.
+  struct VoxelsSeen {
+    bool band = false, any_free = false, all_free = true;
+  };
   template <class Voxels>
-  STILLMAP_HD bool concerns(Int3 block, const Voxels& voxels) const {
+  STILLMAP_HD VoxelsSeen look_at_voxels(Int3 block, const Voxels& voxels) const {
     using F = typename Voxels::Number;
     const VoxelGrid grid(T_cam_map, block, map.voxel_m);
+    VoxelsSeen seen;
     for (int32_t z = 0; z < kBlockEdge; ++z)
       for (int32_t y = 0; y < kBlockEdge; ++y)
         for (int32_t x = 0; x < kBlockEdge; x += Voxels::kCount) {
           const Observation<F> o = observe(geometry, grid.position<F>(voxels.ramp(x), y, z));
-          if (voxels.any(free_space ? o.band | o.free : o.band)) return true;
+          seen.band = voxels.any(o.band);
+          seen.any_free |= voxels.any(o.free);
+          seen.all_free &= !voxels.any(!o.free);
+          if (seen.band || (dense && seen.any_free && free_space)) return seen;
         }
-    return false;
+    return seen;
   }
 };
 

@@ -23,9 +23,34 @@ struct InsertResult {
 };
 
 /// Open addressing with linear, bounded probing. Keys are never removed one by one; `clear` and insert again.
+/// What is here called a block is whatever the pool holds.
 struct HashView {
   View<BlockKey> keys;   ///< capacity a power of two; kEmptyKey: free slot
   View<BlockId> blocks;  ///< kNoBlock: key without a block; kPending: being inserted
+
+  /// Adds a key that is not there, with its block. False: no slot within kMaxProbes.  @thread one
+  STILLMAP_HD bool put(BlockKey key, BlockId block) const {
+    const uint32_t mask = keys.size - 1;
+    uint32_t slot = static_cast<uint32_t>(hash_of(key)) & mask;
+    for (uint32_t probe = 0; probe < kMaxProbes; ++probe, slot = (slot + 1) & mask) {
+      if (keys[slot] != kEmptyKey) continue;
+      keys[slot] = key;
+      blocks[slot] = block;
+      return true;
+    }
+    return false;
+  }
+
+  /// @return where the block of `key` stands, null when absent.  @thread one, while nobody inserts
+  STILLMAP_HD BlockId* slot_of(BlockKey key) const {
+    const uint32_t mask = keys.size - 1;
+    uint32_t slot = static_cast<uint32_t>(hash_of(key)) & mask;
+    for (uint32_t probe = 0; probe < kMaxProbes; ++probe, slot = (slot + 1) & mask) {
+      if (keys[slot] == key) return &blocks[slot];
+      if (keys[slot] == kEmptyKey) return nullptr;
+    }
+    return nullptr;
+  }
 
   static constexpr uint32_t kMaxProbes = 128;
   static constexpr BlockId kPending = kNoBlock - 1;

@@ -3,39 +3,61 @@
 #include <cstdint>
 
 #include "kernels/base/lane.hpp"
+#include "kernels/map/block_ref.hpp"
 #include "kernels/map/hash_view.hpp"
 #include "kernels/map/voxel.hpp"
 
 namespace stillmap {
 
-/// The map as kernels see it: table, pool, voxels. Map frame, metres.
+/// The map as kernels see it: a table of groups, their blocks, the voxels of those that have some. Map frame,
+/// metres.
 struct VolumeView {
-  HashView table;
+  HashView table;  ///< by key of the group (its coordinates, packed): a BlockRef, of a group
+  PoolView group_pool;
+  View<BlockGroup> groups;
   PoolView pool;
   View<VoxelBlock> blocks;     ///< by BlockId
   View<BlockKey> block_keys;   ///< by BlockId; kEmptyKey: not in use
   View<uint8_t> settled_free;  ///< by BlockId; 1: every voxel is free with full weight, seeing it free again
                                ///< changes nothing
+  PoolView partly_pool;
+  View<SeenVoxels> partly;
+  const VoxelBlock* free_block = nullptr;  ///< what readers see of a block that is free and has no voxels
   float voxel_m = 0.01f;
   float truncation_m = 0.1f;
   int32_t mesh_min_weight = 1;   ///< voxels observed less often do not make a mesh, at least 1
   int32_t mesh_min_surface = 0;  ///< nor do those on whose surface fewer measurements lay
 
   STILLMAP_HD float sdf_unit_m() const { return truncation_m / static_cast<float>(kSdfMax); }
+
+  /// @return of a block: has_id, is_free, is_partly, or kNoBlock.  @thread any, also while others insert
+  STILLMAP_HD BlockRef ref_of(Int3 block) const {
+    const BlockRef group = table.find(pack(group_of_block(block)));
+    return has_id(group) ? groups[group].block[index_in_group(block)] : group;
+  }
+  /// @return kNoBlock when the block has no voxels
+  STILLMAP_HD BlockId voxels_of(Int3 block) const {
+    const BlockRef ref = ref_of(block);
+    return has_id(ref) ? ref : kNoBlock;
+  }
+  STILLMAP_HD BlockAt read(Int3 block) const {
+    const BlockRef ref = ref_of(block);
+    if (has_id(ref)) return {&blocks[ref], nullptr};
+    if (is_free(ref)) return {free_block, nullptr};
+    if (is_partly(ref)) return {free_block, &partly[payload(ref)]};
+    return {};
+  }
 };
 
 /// Last block that was looked up; neighbouring pixels mostly fall into the same one.
 struct BlockCache {
   BlockKey key = kEmptyKey;
-  const VoxelBlock* block = nullptr;  ///< null: there is none
+  BlockAt block;
 };
 
-/// @return the block of `key`, null when it is not in the map.
-STILLMAP_HD const VoxelBlock* lookup(const VolumeView& map, BlockKey key, BlockCache& cache) {
-  if (key != cache.key) {
-    const BlockId id = map.table.find(key);
-    cache = {key, id == kNoBlock ? nullptr : &map.blocks[id]};
-  }
+/// @return the block of `key`; false when nothing is known of it.
+STILLMAP_HD BlockAt lookup(const VolumeView& map, BlockKey key, BlockCache& cache) {
+  if (key != cache.key) cache = {key, map.read(unpack(key))};
   return cache.block;
 }
 
@@ -46,7 +68,7 @@ struct RecentBlocks {
   BlockCache place[1 << kBits];
 };
 template <int kBits>
-STILLMAP_HD const VoxelBlock* lookup(const VolumeView& map, BlockKey key, RecentBlocks<kBits>& recent) {
+STILLMAP_HD BlockAt lookup(const VolumeView& map, BlockKey key, RecentBlocks<kBits>& recent) {
   return lookup(map, key, recent.place[key * 0x9e3779b97f4a7c15ull >> (64 - kBits)]);
 }
 
@@ -58,18 +80,22 @@ template <class Cache>
 STILLMAP_HD bool read_corners(const VolumeView& map, Int3 base, Cache& cache, VoxelSurface voxel[8]) {
   const Int3 local = {base.x & 7, base.y & 7, base.z & 7};
   if ((local.x < 7) & (local.y < 7) & (local.z < 7)) {
-    const VoxelBlock* block = lookup(map, pack(block_of_voxel(base)), cache);
+    const BlockAt block = lookup(map, pack(block_of_voxel(base)), cache);
     if (!block) return false;
-    const VoxelSurface* v = block->surface + voxel_index(local.x, local.y, local.z);
     constexpr int32_t y = kBlockEdge, z = kBlockEdge * kBlockEdge;
+    const int32_t at = voxel_index(local.x, local.y, local.z);
+    if (block.seen)
+      for (const int32_t step : {0, 1, y, y + 1, z, z + 1, z + y, z + y + 1})
+        if (!block.seen->has(at + step)) return false;
+    const VoxelSurface* v = block.voxels->surface + at;
     voxel[0] = v[0], voxel[1] = v[1], voxel[2] = v[y], voxel[3] = v[y + 1];
     voxel[4] = v[z], voxel[5] = v[z + 1], voxel[6] = v[z + y], voxel[7] = v[z + y + 1];
   } else {
     for (int32_t i = 0; i < 8; ++i) {
       const Int3 corner = {base.x + (i & 1), base.y + (i >> 1 & 1), base.z + (i >> 2)};
-      const VoxelBlock* block = lookup(map, pack(block_of_voxel(corner)), cache);
+      const BlockAt block = lookup(map, pack(block_of_voxel(corner)), cache);
       if (!block) return false;
-      voxel[i] = block->surface[index_in_block(corner)];
+      voxel[i] = block.surface(index_in_block(corner));
     }
   }
   bool observed = true;

@@ -221,8 +221,8 @@ struct CellEvidencePass {
     const auto up = [](float fraction) { return fraction >= 0.5f ? 1 : 0; };
     const Int3 voxel = {cell.x + up(cell.fraction.x), cell.y + up(cell.fraction.y),
                         cell.z + up(cell.fraction.z)};
-    const VoxelBlock* const block = lookup(track.map, pack(block_of_voxel(voxel)), cache);
-    return block ? block->record[index_in_block(voxel)].colour_weight : uint8_t{0};
+    const BlockAt block = lookup(track.map, pack(block_of_voxel(voxel)), cache);
+    return block ? block.record(index_in_block(voxel)).colour_weight : uint8_t{0};
   }
 };
 

@@ -49,13 +49,16 @@ STILLMAP_HD int32_t round_down(float x) {
   return cut - static_cast<int32_t>(x < static_cast<float>(cut));
 }
 
-/// A voxel with the block that holds it; null when that block is absent.
+/// A voxel with the block that holds it, which may be unknown.
 struct VoxelAt {
-  const VoxelBlock* block;
+  BlockAt block;
   int32_t index;
+
+  /// kSdfUnobserved also when the block is unknown.
+  STILLMAP_HD int16_t sdf() const { return block ? block.surface(index).sdf : kSdfUnobserved; }
 };
 
-/// The eight voxels about a point in voxel units, and where it lies between them. Absent blocks are null.
+/// The eight voxels about a point in voxel units, and where it lies between them.
 struct CornersAt {
   VoxelAt voxel[8];
   Vec3 fraction;
@@ -68,7 +71,7 @@ STILLMAP_HD CornersAt corners_at(const VolumeView& map, Vec3 g, Blocks& blocks) 
   out.fraction = {g.x - static_cast<float>(base.x), g.y - static_cast<float>(base.y),
                   g.z - static_cast<float>(base.z)};
   const Int3 local = {base.x & 7, base.y & 7, base.z & 7};
-  const VoxelBlock* block = lookup(map, pack(block_of_voxel(base)), blocks);
+  const BlockAt block = lookup(map, pack(block_of_voxel(base)), blocks);
   for (int32_t i = 0; i < 8; ++i) {
     const Int3 step = {i & 1, i >> 1 & 1, i >> 2};
     const Int3 at = local + step;
@@ -83,9 +86,9 @@ STILLMAP_HD CornersAt corners_at(const VolumeView& map, Vec3 g, Blocks& blocks) 
 STILLMAP_HD bool interpolate(const CornersAt& corners, float& sdf) {
   float value[8];
   for (int32_t i = 0; i < 8; ++i) {
-    const VoxelAt v = corners.voxel[i];
-    if (!v.block || v.block->surface[v.index].sdf == kSdfUnobserved) return false;
-    value[i] = static_cast<float>(v.block->surface[v.index].sdf);
+    const int16_t corner = corners.voxel[i].sdf();
+    if (corner == kSdfUnobserved) return false;
+    value[i] = static_cast<float>(corner);
   }
   sdf = trilinear(value, corners.fraction);
   return true;
@@ -94,16 +97,16 @@ STILLMAP_HD bool interpolate(const CornersAt& corners, float& sdf) {
 /// Distance of the corner next to the point. False: it is unobserved.
 STILLMAP_HD bool nearest(const CornersAt& corners, float& sdf) {
   const Vec3 f = corners.fraction;
-  const VoxelAt v = corners.voxel[(f.x >= 0.5f ? 1 : 0) | (f.y >= 0.5f ? 2 : 0) | (f.z >= 0.5f ? 4 : 0)];
-  if (!v.block || v.block->surface[v.index].sdf == kSdfUnobserved) return false;
-  sdf = static_cast<float>(v.block->surface[v.index].sdf);
-  return true;
+  const int16_t corner =
+      corners.voxel[(f.x >= 0.5f ? 1 : 0) | (f.y >= 0.5f ? 2 : 0) | (f.z >= 0.5f ? 4 : 0)].sdf();
+  sdf = static_cast<float>(corner);
+  return corner != kSdfUnobserved;
 }
 
 /// The rule of the mesh: a cell with a far corner is the rim of what was seen, no surface.
 STILLMAP_HD bool is_surface(const CornersAt& corners) {
   for (const VoxelAt v : corners.voxel)
-    if (!v.block || is_far(v.block->surface[v.index].sdf)) return false;
+    if (is_far(v.sdf())) return false;
   return true;
 }
 
@@ -112,11 +115,11 @@ STILLMAP_HD Rgb8 colour_at(const CornersAt& corners) {
   float luma = 0, cb = 0, cr = 0, sum = 0;
   for (int32_t i = 0; i < 8; ++i) {
     const VoxelAt v = corners.voxel[i];
-    const VoxelRecord record = v.block->record[v.index];
+    const VoxelRecord record = v.block.record(v.index);
     if (record.colour_weight == 0) continue;
     const Vec3 f = corners.fraction;
     const float w = (i & 1 ? f.x : 1.0f - f.x) * (i & 2 ? f.y : 1.0f - f.y) * (i & 4 ? f.z : 1.0f - f.z);
-    luma += w * static_cast<float>(v.block->surface[v.index].luma);
+    luma += w * static_cast<float>(v.block.surface(v.index).luma);
     cb += w * static_cast<float>(record.cb);
     cr += w * static_cast<float>(record.cr);
     sum += w;
@@ -195,13 +198,17 @@ STILLMAP_HD RayHit cast_ray(const VolumeView& map, const Ray& ray, Blocks& block
     if (!in_grid(g)) return {};
     const Vec3 h = {g.x + 0.5f, g.y + 0.5f, g.z + 0.5f};
     const Int3 voxel = {round_down(h.x), round_down(h.y), round_down(h.z)};
-    const VoxelBlock* block = lookup(map, pack(block_of_voxel(voxel)), blocks);
-    if (!block) {
+    const BlockAt block = lookup(map, pack(block_of_voxel(voxel)), blocks);
+    if (!block || (block.voxels == map.free_block && !block.seen)) {
+      // All of it unknown, or all of it free: the ray leaves it at once.
+      t_outside = t;
+      s_outside = static_cast<float>(kSdfMax) * voxels_per_unit;
+      if (block && side < 0 && !ray.through_backs) return {};
       t += fmaxf(exit_m(h, d, block_of_voxel(voxel)), 0.0f) + 0.01f * m_per_voxel;
-      side = 0;
+      side = block ? 1 : 0;
       continue;
     }
-    const int16_t sdf = block->surface[index_in_block(voxel)].sdf;
+    const int16_t sdf = block.surface(index_in_block(voxel)).sdf;
     if (sdf == kSdfUnobserved) {
       t += m_per_voxel;
       side = 0;

@@ -3,15 +3,14 @@
 // A map written directly from a formula: what fusion would leave without noise.
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <functional>
-#include <numeric>
+#include <memory>
 #include <random>
 #include <vector>
 
-#include "kernels/map/volume_view.hpp"
+#include "kernels/backend/cpu/map_storage.hpp"
 
 namespace stillmap {
 
@@ -24,19 +23,15 @@ struct AnalyticSample {
 };
 using AnalyticField = std::function<AnalyticSample(Vec3d p_map)>;
 
-/// Owner of the storage behind a VolumeView.
+/// Owner of a map and its memory.
 class AnalyticMap {
  public:
-  explicit AnalyticMap(uint32_t pool_blocks, float voxel_m = 0.01f, float truncation_m = 0.1f) {
-    keys_.assign(std::bit_ceil(2 * pool_blocks), kEmptyKey);
-    ids_.assign(keys_.size(), kNoBlock);
-    blocks_.resize(pool_blocks);
-    block_keys_.assign(pool_blocks, kEmptyKey);
-    settled_free_.assign(pool_blocks, 0);
-    free_ids_.resize(pool_blocks);
-    std::iota(free_ids_.begin(), free_ids_.end(), 0u);
-    view_.voxel_m = voxel_m;
-    view_.truncation_m = truncation_m;
+  explicit AnalyticMap(uint32_t pool_blocks, float voxel_m = 0.01f, float truncation_m = 0.1f,
+                       FreeSpace free_space = FreeSpace::dense)
+      : params_{params_of(pool_blocks, voxel_m, truncation_m, free_space)},
+        arena_(std::make_unique<Arena>(bytes(params_))) {
+    storage.carve(*arena_, params_, kWeightCap);
+    storage.clear();
   }
 
   /// One voxel seen once, at this distance.
@@ -49,15 +44,14 @@ class AnalyticMap {
   /// From now on blocks get ids in this random order.
   void shuffle_ids(uint32_t seed) {
     std::mt19937 random(seed);
-    std::shuffle(free_ids_.begin() + used_, free_ids_.end(), random);
+    const PoolView& pool = view().pool;
+    std::shuffle(pool.free_ids.begin() + *pool.used, pool.free_ids.end(), random);
   }
 
   /// The block at these block coordinates, made when it is not there; null when the pool is empty.
   VoxelBlock* block(Int3 at) {
-    const InsertResult result = view().table.insert(pack(at), view().pool);
-    if (result.block == kNoBlock) return nullptr;
-    block_keys_[result.block] = pack(at);
-    return &blocks_[result.block];
+    const InsertResult result = storage.insert(pack(at));
+    return result.block == kNoBlock ? nullptr : &view().blocks[result.block];
   }
   VoxelSurface& surface(Int3 voxel) { return block(block_of_voxel(voxel))->surface[index_in_block(voxel)]; }
   VoxelRecord& record(Int3 voxel) { return block(block_of_voxel(voxel))->record[index_in_block(voxel)]; }
@@ -73,30 +67,39 @@ class AnalyticMap {
     for (const Int3 at : order) fill_block(at, field);
   }
 
-  VolumeView view() {
-    view_.table = {{keys_.data(), size_of(keys_)}, {ids_.data(), size_of(ids_)}};
-    view_.pool = {{free_ids_.data(), size_of(free_ids_)}, &used_};
-    view_.blocks = {blocks_.data(), size_of(blocks_)};
-    view_.block_keys = {block_keys_.data(), size_of(block_keys_)};
-    view_.settled_free = {settled_free_.data(), size_of(settled_free_)};
-    return view_;
-  }
-  uint32_t used_blocks() const { return used_; }
+  const VolumeView& view() const { return storage.view(); }
+  uint32_t used_blocks() const { return *view().pool.used; }
+
+  MapStorage storage;
 
  private:
-  template <class T>
-  static uint32_t size_of(const std::vector<T>& v) {
-    return static_cast<uint32_t>(v.size());
+  static constexpr int32_t kWeightCap = 64;
+
+  static MapParams params_of(uint32_t pool_blocks, float voxel_m, float truncation_m, FreeSpace free_space) {
+    MapParams p;
+    p.voxel_m = voxel_m;
+    p.truncation_m = truncation_m;
+    p.free_space = free_space;
+    p.pool_blocks = static_cast<int32_t>(pool_blocks);
+    p.mesh_min_weight = 1;
+    p.mesh_min_surface = 0;
+    return p;
+  }
+  static uint64_t bytes(const MapParams& params) {
+    Arena measure;
+    MapStorage plan;
+    plan.carve(measure, params, kWeightCap);
+    return measure.items().total_bytes;
   }
 
   void fill_block(Int3 at, const AnalyticField& field) {
     VoxelBlock& out = *block(at);
     for (int32_t i = 0; i < kBlockVoxels; ++i) {
       const Int3 voxel = first_voxel(at) + Int3{i & 7, i >> 3 & 7, i >> 6};
-      const double step = static_cast<double>(view_.voxel_m);
+      const double step = static_cast<double>(params_.voxel_m);
       const AnalyticSample s = field({voxel.x * step, voxel.y * step, voxel.z * step});
       if (!s.observed) continue;
-      const double share = std::clamp(s.sdf_m / static_cast<double>(view_.truncation_m), -1.0, 1.0);
+      const double share = std::clamp(s.sdf_m / static_cast<double>(params_.truncation_m), -1.0, 1.0);
       out.surface[i].sdf = static_cast<int16_t>(std::lround(share * kSdfMax));
       out.record[i].weight = 1;
       if (s.coloured) set_colour(s.colour, out.surface[i], out.record[i]);
@@ -111,12 +114,8 @@ class AnalyticMap {
     record.cr = clamp_to_byte(128.0f + (static_cast<float>(c.r) - 255.0f * y) / 1.5748f);
   }
 
-  std::vector<BlockKey> keys_, block_keys_;
-  std::vector<BlockId> ids_, free_ids_;
-  std::vector<VoxelBlock> blocks_;
-  std::vector<uint8_t> settled_free_;
-  uint32_t used_ = 0;
-  VolumeView view_;
+  MapParams params_;
+  std::unique_ptr<Arena> arena_;
 };
 
 /// Distances outside the shapes are above 0.

@@ -66,6 +66,20 @@ uint64_t max_groups(const EngineParams& p) {
   return edge * edge * edge;
 }
 
+/// Each block with voxels once, and each that was seen in part.
+uint64_t max_visible(const EngineParams& p) {
+  return 2 * static_cast<uint64_t>(p.map.pool_blocks);
+}
+
+PointState point_state(const VolumeView& map, Vec3 p_map, BlockCache& cache) {
+  const float inv = 1.0f / map.voxel_m;
+  const auto nearest = [&](float x_m) { return static_cast<int32_t>(std::floor(x_m * inv + 0.5f)); };
+  const Int3 voxel = {nearest(p_map.x), nearest(p_map.y), nearest(p_map.z)};
+  const BlockAt block = lookup(map, pack(block_of_voxel(voxel)), cache);
+  const int16_t sdf = block ? block.surface(index_in_block(voxel)).sdf : kSdfUnobserved;
+  return sdf == kSdfUnobserved ? PointState::unknown : sdf > 0 ? PointState::free : PointState::occupied;
+}
+
 /// Everything that lives as long as the engine.
 struct CpuMemory {
   ImageView<float> depth_m, static_depth_m;
@@ -105,11 +119,11 @@ struct CpuMemory {
     track_tiles = arena.take<NormalEqT<float>>("sums of tiles", tiles);
     valid_tiles = arena.take<int32_t>("sums of tiles", tiles);
     groups = arena.take<GroupView>("visible blocks", max_groups(p));
-    visible = arena.take<VisibleBlock>("visible blocks", static_cast<uint64_t>(p.map.pool_blocks));
+    visible = arena.take<VisibleBlock>("visible blocks", max_visible(p));
     extract_scratch = arena.take<uint8_t>("mesh and views",
                                           extract_scratch_bytes(static_cast<uint32_t>(p.map.pool_blocks)));
     raycast_scratch = arena.take<uint8_t>("mesh and views", raycast_scratch_bytes());
-    map.carve(arena, p.map);
+    map.carve(arena, p.map, p.integrate.weight_cap);
     relocaliser.carve(arena, p);
   }
 
@@ -194,6 +208,13 @@ class CpuEngine final : public Engine {
     return stillmap::extract_mesh(memory_.map.view(), sink, memory_.extract_scratch, pool_);
   }
 
+  void look_up(View<const Vec3> points_map_m, View<PointState> states) const override;
+  uint32_t list_groups(View<uint64_t> keys) const override { return memory_.map.list_groups(keys); }
+  uint32_t write_group(uint64_t key, View<uint8_t> record) const override {
+    return memory_.map.write_group(key, record);
+  }
+  Status read_group(View<const uint8_t> record) override { return memory_.map.read_group(record); }
+
   ImageView<const uint8_t> mask_image() const override { return memory_.mask; }
   ImageView<const float> depth_image_m() const override { return memory_.depth_m; }
   ImageView<const Rgb8> colour_image() const override { return memory_.colour; }
@@ -232,6 +253,8 @@ class CpuEngine final : public Engine {
   void update_static_depth();
   VisibleGroupPass visible_pass(const Se3& T_map_cam, const FrameGeometry& geometry) const;
   Status list_visible(const VisibleGroupPass& pass, uint32_t& visible_count);
+  void merge_free(const VisibleGroupPass& pass, View<const VisibleBlock> visible);
+  bool dense() const { return params_.map.free_space == FreeSpace::dense; }
 
   EngineParams params_;
   Arena arena_;
@@ -532,7 +555,9 @@ VisibleGroupPass CpuEngine::visible_pass(const Se3& T_map_cam, const FrameGeomet
           inverse(T_map_cam),
           first,
           {last.x - first.x + 1, last.y - first.y + 1, last.z - first.z + 1},
-          params_.integrate.free_space};
+          params_.integrate.free_space,
+          dense(),
+          static_cast<uint32_t>(params_.integrate.weight_cap)};
 }
 
 /// Lists the visible blocks, in an order that does not depend on threads; makes those that are new.
@@ -547,22 +572,42 @@ Status CpuEngine::list_visible(const VisibleGroupPass& pass, uint32_t& visible_c
     for (uint32_t g = tile * kGroupsPerTile; g < end; ++g) memory_.groups[g] = loops_.visible_group(pass, g);
   });
   visible_count = 0;
-  const auto add = [&](uint32_t group, int32_t bit, bool free) {
-    const InsertResult block = memory_.map.insert(pack(pass.block_at(group, bit)));
-    if (block.block == kNoBlock) {
+  const auto add = [&](const InsertResult& block, uint32_t kind) {
+    if (block.answer != Insert::inserted && block.answer != Insert::existed)
       status = Status::capacity_exhausted;
-    } else if (!free || !pass.map.settled_free[block.block]) {
-      memory_.visible[visible_count++] = {block.block | (free ? VisibleBlock::kFree : 0u)};
-    }
+    else if (block.block != kNoBlock)
+      memory_.visible[visible_count++] = {block.block | kind};
   };
   // Surfaces before free space: when the pool runs out, tracking needs the surfaces.
-  for (const bool free : {false, true})
-    for (uint32_t g = 0; g < count; ++g) {
-      const GroupView view = memory_.groups[g];
-      for (uint64_t bits = free ? view.free : view.mixed; bits; bits &= bits - 1)
-        add(g, __builtin_ctzll(bits), free);
+  for (uint32_t g = 0; g < count; ++g)
+    for (uint64_t bits = memory_.groups[g].mixed; bits; bits &= bits - 1)
+      add(memory_.map.insert(pack(pass.block_at(g, __builtin_ctzll(bits)))), 0);
+  for (uint32_t g = 0; g < count; ++g) {
+    const GroupView view = memory_.groups[g];
+    if (!pass.dense && view.free == ~0ull && memory_.map.see_group_free(pass.group_at(g))) continue;
+    for (uint64_t bits = view.free; bits; bits &= bits - 1) {
+      const Int3 block = pass.block_at(g, __builtin_ctzll(bits));
+      const InsertResult found = pass.dense ? memory_.map.insert(pack(block)) : memory_.map.see_free(block);
+      const bool settled = found.block != kNoBlock && pass.map.settled_free[found.block];
+      if (!settled) add(found, VisibleBlock::kFree);
     }
+    for (uint64_t bits = view.partly; bits; bits &= bits - 1)
+      add(memory_.map.see_partly(pass.block_at(g, __builtin_ctzll(bits))), VisibleBlock::kPartly);
+  }
   return status;
+}
+
+/// Gives back what a free block or group of blocks can do without.
+void CpuEngine::merge_free(const VisibleGroupPass& pass, View<const VisibleBlock> visible) {
+  for (const VisibleBlock block : visible) {
+    if (block.partly())
+      memory_.map.release_partly(block.id());
+    else if (pass.map.settled_free[block.id()] == kNoSurfaceLeft)
+      memory_.map.release_voxels(block.id());
+  }
+  const uint32_t groups = static_cast<uint32_t>(pass.groups.x * pass.groups.y * pass.groups.z);
+  for (uint32_t g = 0; g < std::min(groups, memory_.groups.size); ++g)
+    if (memory_.groups[g].free) memory_.map.merge_group(pass.group_at(g));
 }
 
 IntegrateResult CpuEngine::integrate(const Se3& T_world_cam) {
@@ -585,15 +630,24 @@ IntegrateResult CpuEngine::integrate(const Se3& T_world_cam) {
                            {static_cast<float>(kSdfMax) / params_.map.truncation_m,
                             static_cast<float>(params_.integrate.weight_cap), params_.integrate.relearn},
                            params_.integrate.free_space,
-                           frames_};
+                           frames_,
+                           dense()};
   frames_ = (frames_ + 1) & 0xffff;
   const View<const VisibleBlock> blocks{memory_.visible.data, result.visible_blocks};
   pool_.for_each((blocks.size + kBlocksPerTile - 1) / kBlocksPerTile, [&](uint32_t tile) {
     const uint32_t first = tile * kBlocksPerTile;
     loops_.integrate(pass, {blocks.data + first, std::min(kBlocksPerTile, blocks.size - first)});
   });
+  if (!dense()) merge_free(visible, blocks);
   result.map = memory_.map.health();
   return result;
+}
+
+void CpuEngine::look_up(View<const Vec3> points_map_m, View<PointState> states) const {
+  const VolumeView& map = memory_.map.view();
+  BlockCache cache;
+  for (uint32_t i = 0; i < std::min(points_map_m.size, states.size); ++i)
+    states[i] = point_state(map, points_map_m[i], cache);
 }
 
 }  // namespace

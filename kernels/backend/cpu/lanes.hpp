@@ -16,11 +16,16 @@ struct Mask8 {
   using Bits = int32_t __attribute__((vector_size(32)));
   Bits bits;  ///< each lane all ones or all zeros
 
-  /// One bit a lane, lane 0 lowest.
-  STILLMAP_HD uint32_t any() const {
+  STILLMAP_HD bool any() const {
     int32_t all = 0;
     for (int32_t i = 0; i < kLanes; ++i) all |= bits[i];
-    return static_cast<uint32_t>(all);
+    return all != 0;
+  }
+  /// One bit a lane, lane 0 lowest.
+  STILLMAP_HD uint32_t lanes() const {
+    uint32_t all = 0;
+    for (int32_t i = 0; i < kLanes; ++i) all |= (static_cast<uint32_t>(bits[i]) & 1u) << i;
+    return all;
   }
 };
 STILLMAP_HD Mask8 operator&(Mask8 a, Mask8 b) {

@@ -155,6 +155,7 @@ struct RowVoxels {
 
   STILLMAP_HD Mask8 all() const { return Int8(0) == Int8(0); }
   STILLMAP_HD bool any(Mask8 which) const { return which.any(); }
+  STILLMAP_HD uint32_t bits(Mask8 which) const { return which.lanes(); }
   STILLMAP_HD Float8 ramp(int32_t) const { return Float8::ramp(); }
   STILLMAP_HD Int8 index(int32_t i) const { return Int8(i) + to_int(Float8::ramp()); }
   STILLMAP_HD VoxelState<Float8> load(const VoxelBlock& block, int32_t i) const {

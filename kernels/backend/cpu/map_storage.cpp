@@ -4,120 +4,440 @@
 #include <bit>
 #include <cstring>
 
+#include "kernels/integrate/integrate_pass.hpp"
+
 namespace stillmap {
 namespace {
 
-/// Twice as many slots as blocks: chains stay short.
-uint64_t table_slots(int32_t pool_blocks) {
-  return std::bit_ceil(2u * static_cast<uint32_t>(pool_blocks));
+// Surfaces fill a third of the groups they are in; the rest is for the rim of what was seen.
+constexpr uint64_t kBlocksPerGroup = 4;
+constexpr uint64_t kFewestGroups = 1024;
+constexpr uint64_t kBlocksPerPartly = 2;
+/// Groups that are free throughout take a slot and nothing else.
+constexpr uint64_t kFewestSlots = 16;
+
+uint32_t table_slots(uint64_t pool_blocks) {
+  return static_cast<uint32_t>(std::bit_ceil(std::max(pool_blocks, kFewestSlots)));
+}
+/// Chains stay short.
+uint32_t most_entries(uint32_t slots) {
+  return slots / 2;
 }
 
-void make_unobserved(VoxelBlock& block) {
-  std::fill_n(block.surface, kBlockVoxels, VoxelSurface{});
-  std::fill_n(block.record, kBlockVoxels, VoxelRecord{});
+void fill(VoxelBlock& block, VoxelSurface surface, VoxelRecord record) {
+  std::fill_n(block.surface, kBlockVoxels, surface);
+  std::fill_n(block.record, kBlockVoxels, record);
+}
+VoxelRecord seen_often(uint32_t looks) {
+  VoxelRecord record;
+  record.weight = static_cast<uint8_t>(std::min(looks, 255u));
+  return record;
 }
 
-float distance2(Vec3 centre_map, BlockKey key, float voxel_m) {
-  const Vec3 d = voxel_position(first_voxel(unpack(key)) + Int3{4, 4, 4}, voxel_m) - centre_map;
+float distance2(Vec3 centre_map, BlockKey group, float voxel_m) {
+  constexpr int32_t half = kGroupEdge * kBlockEdge / 2;
+  const Vec3 d =
+      voxel_position(first_voxel(block_in_group(unpack(group), 0)) + Int3{half, half, half}, voxel_m) -
+      centre_map;
   return dot(d, d);
+}
+
+/// False: no record, or one that does not hold what its head says.
+bool read_head(View<const uint8_t> record, GroupRecordHead& head) {
+  if (record.size < sizeof head) return false;
+  std::memcpy(&head, record.data, sizeof head);
+  uint32_t bytes = sizeof head;
+  for (int32_t i = 0; i < kGroupBlocks; ++i) {
+    const auto kind = static_cast<BlockKind>(head.kind[i]);
+    if (kind > BlockKind::partly || (head.uniform_looks > 0 && kind != BlockKind::unknown)) return false;
+    const bool looked_at = kind == BlockKind::free || kind == BlockKind::partly;
+    if (looked_at != (head.looks[i] > 0) || head.settled[i] > kNoSurfaceLeft) return false;
+    bytes += payload_bytes(kind);
+  }
+  return head.bytes == bytes && record.size == bytes && head.uniform_looks <= 255 &&
+         head.group == pack(unpack(head.group));
+}
+
+void fill_pool(const PoolView& pool) {
+  for (uint32_t i = 0; i < pool.free_ids.size; ++i) pool.free_ids[i] = i;
+  *pool.used = 0;
 }
 
 }  // namespace
 
-void MapStorage::carve(Arena& arena, const MapParams& params) {
-  const uint64_t blocks = static_cast<uint64_t>(params.pool_blocks), slots = table_slots(params.pool_blocks);
+void MapStorage::carve(Arena& arena, const MapParams& params, int32_t weight_cap) {
+  const uint64_t blocks = static_cast<uint64_t>(params.pool_blocks);
+  const uint64_t groups = std::max(blocks / kBlocksPerGroup, std::min(blocks, kFewestGroups));
+  const uint64_t partly =
+      params.free_space == FreeSpace::hierarchical ? blocks / kBlocksPerPartly + 1 : uint64_t{0};
+  const uint32_t slots = table_slots(blocks);
   view_.voxel_m = params.voxel_m;
   view_.truncation_m = params.truncation_m;
   view_.mesh_min_weight = params.mesh_min_weight;
   view_.mesh_min_surface = params.mesh_min_surface;
-  view_.table.keys = arena.take<BlockKey>("map: block table", slots);
-  view_.table.blocks = arena.take<BlockId>("map: block table", slots);
+  view_.table.keys = arena.take<BlockKey>("map: table", slots);
+  view_.table.blocks = arena.take<BlockRef>("map: table", slots);
+  order_ = arena.take<TableEntry>("map: table", slots);
+  view_.groups = arena.take<BlockGroup>("map: groups of blocks", groups);
+  view_.group_pool.free_ids = arena.take<BlockId>("map: groups of blocks", groups);
   view_.blocks = arena.take<VoxelBlock>("map: voxel blocks", blocks);
+  free_block_ = arena.take<VoxelBlock>("map: voxel blocks", 1);
   view_.block_keys = arena.take<BlockKey>("map: block lists", blocks);
   view_.settled_free = arena.take<uint8_t>("map: block lists", blocks);
   view_.pool.free_ids = arena.take<BlockId>("map: block lists", blocks);
-  order_ = arena.take<BlockId>("map: block lists", blocks);
-  used_ = arena.take<uint32_t>("map: block lists", 1);
+  view_.partly = arena.take<SeenVoxels>("map: partly seen blocks", partly);
+  view_.partly_pool.free_ids = arena.take<BlockId>("map: partly seen blocks", partly);
+  used_ = arena.take<uint32_t>("map: block lists", 3);
   view_.pool.used = used_.data;
-  high_water_blocks_ = static_cast<uint32_t>(params.high_water * static_cast<float>(params.pool_blocks));
+  view_.group_pool.used = used_.data + 1;
+  view_.partly_pool.used = used_.data + 2;
+  view_.free_block = free_block_.data;
+  enough_ = static_cast<uint32_t>(weight_cap);
+  high_water_ = params.high_water;
   health_.capacity = static_cast<uint32_t>(blocks);
 }
 
-void MapStorage::clear_table() {
+void MapStorage::clear() {
   std::fill(view_.table.keys.begin(), view_.table.keys.end(), kEmptyKey);
   std::fill(view_.table.blocks.begin(), view_.table.blocks.end(), kNoBlock);
+  std::fill(view_.block_keys.begin(), view_.block_keys.end(), kEmptyKey);
+  for (SeenVoxels& seen : view_.partly) seen.key = kEmptyKey;
+  for (const PoolView* pool : {&view_.pool, &view_.group_pool, &view_.partly_pool}) fill_pool(*pool);
+  fill(free_block_[0], {kSdfMax, 0}, seen_often(255));
+  table_entries_ = 0;
 }
 
-void MapStorage::clear() {
-  clear_table();
-  std::fill(view_.block_keys.begin(), view_.block_keys.end(), kEmptyKey);
-  for (uint32_t i = 0; i < view_.pool.free_ids.size; ++i) view_.pool.free_ids[i] = i;
-  used_[0] = 0;
+uint64_t MapStorage::bytes_in_use() const {
+  return uint64_t{used_[0]} * (sizeof(VoxelBlock) + sizeof(BlockKey) + sizeof(uint8_t)) +
+         uint64_t{used_[1]} * sizeof(BlockGroup) + uint64_t{used_[2]} * sizeof(SeenVoxels) +
+         uint64_t{table_entries_} * (sizeof(BlockKey) + sizeof(BlockRef));
+}
+
+void MapStorage::note_peak() {
+  health_.peak_blocks = std::max(health_.peak_blocks, used_[0]);
+  health_.bytes = std::max(health_.bytes, bytes_in_use());
 }
 
 MapHealth MapStorage::health() const {
   MapHealth h = health_;
   h.blocks = used_[0];
-  h.bytes = static_cast<uint64_t>(h.peak_blocks) * (sizeof(VoxelBlock) + sizeof(BlockKey) + sizeof(BlockId));
   return h;
 }
 
-InsertResult MapStorage::insert(BlockKey key) {
-  const InsertResult result = view_.table.insert(key, view_.pool);
-  switch (result.answer) {
-    case Insert::existed:
-      break;
-    case Insert::inserted:
-      make_unobserved(view_.blocks[result.block]);
-      view_.block_keys[result.block] = key;
-      view_.settled_free[result.block] = 0;
-      health_.peak_blocks = std::max(health_.peak_blocks, used_[0]);
-      break;
-    case Insert::contended:
-      ++health_.contended;
-      break;
-    case Insert::table_full:
-      ++health_.table_full;
-      break;
-    case Insert::pool_empty:
-      ++health_.pool_empty;
-      break;
+bool MapStorage::count(Insert answer) {
+  health_.contended += answer == Insert::contended;
+  health_.table_full += answer == Insert::table_full;
+  health_.pool_empty += answer == Insert::pool_empty;
+  return answer == Insert::inserted || answer == Insert::existed;
+}
+
+/// A group of its own blocks: made when there is none, taken apart when it was the same throughout.
+BlockGroup* MapStorage::open_group(Int3 group) {
+  const BlockKey key = pack(group);
+  BlockRef* const known = view_.table.slot_of(key);
+  const BlockRef was = known ? *known : kNoBlock;
+  if (has_id(was)) return &view_.groups[was];
+  if (known) *known = kNoBlock;
+  const InsertResult made = view_.table.insert(key, view_.group_pool);
+  if (!count(made.answer)) {
+    if (known) *known = was;
+    return nullptr;
   }
-  return result;
+  table_entries_ += was == kNoBlock;
+  BlockGroup& blocks = view_.groups[made.block];
+  std::fill_n(blocks.block, kGroupBlocks, was);
+  note_peak();
+  return &blocks;
+}
+
+BlockRef* MapStorage::open(Int3 block) {
+  BlockGroup* const group = open_group(group_of_block(block));
+  return group ? &group->block[index_in_group(block)] : nullptr;
+}
+
+InsertResult MapStorage::insert(BlockKey key) {
+  const Int3 at = unpack(key);
+  BlockRef* const ref = open(at);
+  if (!ref) return {Insert::pool_empty, kNoBlock};
+  if (has_id(*ref)) return {Insert::existed, *ref};
+  const BlockId id = view_.pool.take();
+  if (id == kNoBlock) {
+    count(Insert::pool_empty);
+    return {Insert::pool_empty, kNoBlock};
+  }
+  VoxelBlock& block = view_.blocks[id];
+  fill(block, {}, {});
+  if (is_free(*ref)) {
+    fill(block, {kSdfMax, 0}, seen_often(payload(*ref)));
+  } else if (is_partly(*ref)) {
+    const SeenVoxels& seen = view_.partly[payload(*ref)];
+    for (int32_t i = 0; i < kBlockVoxels; ++i) {
+      if (!seen.has(i)) continue;
+      block.surface[i].sdf = kSdfMax;
+      block.record[i] = seen_often(seen.looks);
+    }
+    remove(*ref);
+  }
+  *ref = id;
+  view_.block_keys[id] = key;
+  view_.settled_free[id] = 0;
+  note_peak();
+  return {Insert::inserted, id};
+}
+
+bool MapStorage::see_group_free(Int3 group) {
+  const BlockKey key = pack(group);
+  BlockRef* const ref = view_.table.slot_of(key);
+  if (ref && has_id(*ref)) return false;
+  if (ref && is_free(*ref)) {
+    *ref = free_ref(looks_more(payload(*ref)));
+    return true;
+  }
+  const InsertResult made = view_.table.insert(key, view_.group_pool);
+  if (!count(made.answer)) return false;
+  ++table_entries_;
+  *view_.table.slot_of(key) = free_ref(1);
+  view_.group_pool.give_back(made.block);
+  note_peak();
+  return true;
+}
+
+InsertResult MapStorage::see_free(Int3 block) {
+  BlockRef* const ref = open(block);
+  if (!ref) return {Insert::pool_empty, kNoBlock};
+  if (has_id(*ref)) return {Insert::existed, *ref};
+  const uint32_t looks = is_free(*ref)     ? payload(*ref)
+                         : is_partly(*ref) ? view_.partly[payload(*ref)].looks
+                                           : 0u;
+  remove(*ref);
+  *ref = free_ref(looks_more(looks));
+  return {Insert::existed, kNoBlock};
+}
+
+InsertResult MapStorage::see_partly(Int3 block) {
+  BlockRef* const ref = open(block);
+  if (!ref) return {Insert::pool_empty, kNoBlock};
+  if (has_id(*ref) || is_free(*ref)) return {Insert::existed, kNoBlock};
+  if (is_partly(*ref)) {
+    SeenVoxels& seen = view_.partly[payload(*ref)];
+    seen.looks = looks_more(seen.looks);
+    return {Insert::existed, payload(*ref)};
+  }
+  const uint32_t id = view_.partly_pool.take();
+  if (id == kNoBlock) {
+    count(Insert::pool_empty);
+    return {Insert::pool_empty, kNoBlock};
+  }
+  view_.partly[id] = {{}, pack(block), 1};
+  *ref = kPartlyRef | id;
+  note_peak();
+  return {Insert::inserted, id};
+}
+
+void MapStorage::release_voxels(BlockId id) {
+  const Int3 at = unpack(view_.block_keys[id]);
+  const VoxelBlock& block = view_.blocks[id];
+  SeenVoxels seen = {};
+  uint32_t looks = 255;
+  for (int32_t i = 0; i < kBlockVoxels; ++i) {
+    if (block.surface[i].sdf == kSdfUnobserved) continue;
+    seen.layer[i >> 6] |= 1ull << (i & 63);
+    looks = std::min<uint32_t>(looks, block.record[i].weight);
+  }
+  BlockRef* const ref = open(at);
+  if (!ref) return;
+  if (seen.all()) {
+    *ref = free_ref(std::min(looks, enough_));
+  } else {
+    const uint32_t partly = view_.partly_pool.take();
+    if (partly == kNoBlock) return;  // it keeps its voxels
+    seen.key = view_.block_keys[id];
+    seen.looks = std::min(looks, enough_);
+    view_.partly[partly] = seen;
+    *ref = kPartlyRef | partly;
+  }
+  remove(id);
+}
+
+void MapStorage::release_partly(uint32_t id) {
+  const SeenVoxels& seen = view_.partly[id];
+  if (!seen.all()) return;
+  BlockRef* const ref = open(unpack(seen.key));
+  *ref = free_ref(seen.looks);
+  remove(kPartlyRef | id);
+}
+
+void MapStorage::merge_group(Int3 group) {
+  BlockRef* const ref = view_.table.slot_of(pack(group));
+  if (!ref || !has_id(*ref)) return;
+  for (const BlockRef block : view_.groups[*ref].block)
+    if (!is_free(block) || payload(block) < enough_) return;
+  view_.group_pool.give_back(*ref);
+  *ref = free_ref(enough_);
+}
+
+uint32_t MapStorage::list_groups(View<BlockKey> keys) const {
+  uint32_t count = 0;
+  for (uint32_t slot = 0; slot < view_.table.keys.size; ++slot) {
+    if (view_.table.keys[slot] == kEmptyKey || view_.table.blocks[slot] == kNoBlock) continue;
+    if (count < keys.size) keys[count] = view_.table.keys[slot];
+    ++count;
+  }
+  std::sort(keys.begin(), keys.begin() + std::min(count, keys.size));
+  return count;
+}
+
+uint32_t MapStorage::write_group(BlockKey key, View<uint8_t> record) const {
+  const BlockRef group = view_.table.find(key);
+  if (group == kNoBlock || record.size < sizeof(GroupRecordHead)) return 0;
+  GroupRecordHead head = {key, sizeof head, is_free(group) ? payload(group) : 0u, {}, {}, {}};
+  for (int32_t i = 0; has_id(group) && i < kGroupBlocks; ++i) {
+    const BlockRef block = view_.groups[group].block[i];
+    BlockKind kind = BlockKind::unknown;
+    const uint8_t* from = nullptr;
+    if (has_id(block)) {
+      kind = BlockKind::voxels;
+      head.settled[i] = view_.settled_free[block];
+      from = reinterpret_cast<const uint8_t*>(&view_.blocks[block]);
+    } else if (is_free(block)) {
+      kind = BlockKind::free;
+      head.looks[i] = static_cast<uint8_t>(payload(block));
+    } else if (is_partly(block)) {
+      const SeenVoxels& seen = view_.partly[payload(block)];
+      kind = BlockKind::partly;
+      head.looks[i] = static_cast<uint8_t>(seen.looks);
+      from = reinterpret_cast<const uint8_t*>(seen.layer);
+    }
+    head.kind[i] = static_cast<uint8_t>(kind);
+    const uint32_t bytes = payload_bytes(kind);
+    if (record.size - head.bytes < bytes) return 0;
+    if (from) std::memcpy(record.data + head.bytes, from, bytes);
+    head.bytes += bytes;
+  }
+  std::memcpy(record.data, &head, sizeof head);
+  return head.bytes;
+}
+
+bool MapStorage::has_room_for(const GroupRecordHead& head) const {
+  uint32_t voxels = 0, partly = 0;
+  for (const uint8_t kind : head.kind) {
+    voxels += static_cast<BlockKind>(kind) == BlockKind::voxels;
+    partly += static_cast<BlockKind>(kind) == BlockKind::partly;
+  }
+  const auto room = [](uint32_t wanted, const PoolView& pool) {
+    return wanted <= pool.free_ids.size - *pool.used;
+  };
+  return room(voxels, view_.pool) && room(partly, view_.partly_pool) && room(1, view_.group_pool);
+}
+
+void MapStorage::read_block(const GroupRecordHead& head, int32_t index, const uint8_t*& from, BlockRef& ref) {
+  const auto kind = static_cast<BlockKind>(head.kind[index]);
+  const BlockKey key = pack(block_in_group(unpack(head.group), index));
+  ref = kNoBlock;
+  if (kind == BlockKind::voxels) {
+    ref = view_.pool.take();
+    std::memcpy(&view_.blocks[ref], from, sizeof(VoxelBlock));
+    view_.block_keys[ref] = key;
+    view_.settled_free[ref] = head.settled[index];
+  } else if (kind == BlockKind::free) {
+    ref = free_ref(head.looks[index]);
+  } else if (kind == BlockKind::partly) {
+    const uint32_t id = view_.partly_pool.take();
+    SeenVoxels& seen = view_.partly[id];
+    std::memcpy(seen.layer, from, kSeenBytes);
+    seen.key = key;
+    seen.looks = head.looks[index];
+    ref = kPartlyRef | id;
+  }
+  from += payload_bytes(kind);
+}
+
+Status MapStorage::read_group(View<const uint8_t> record) {
+  GroupRecordHead head;
+  if (!read_head(record, head)) return Status::bad_data;
+  if (!has_room_for(head)) return Status::capacity_exhausted;
+  BlockGroup* const group = open_group(unpack(head.group));
+  if (!group) return Status::capacity_exhausted;
+  const uint8_t* from = record.data + sizeof head;
+  for (int32_t i = 0; i < kGroupBlocks; ++i) {
+    remove(group->block[i]);
+    read_block(head, i, from, group->block[i]);
+  }
+  if (head.uniform_looks > 0) {
+    BlockRef* const ref = view_.table.slot_of(head.group);
+    view_.group_pool.give_back(*ref);
+    *ref = free_ref(head.uniform_looks);
+  }
+  note_peak();
+  return Status::ok;
+}
+
+bool MapStorage::above_high_water() const {
+  const auto full = [&](uint32_t used, uint32_t capacity) {
+    return static_cast<float>(used) > high_water_ * static_cast<float>(capacity);
+  };
+  return full(used_[0], view_.pool.free_ids.size) || full(used_[1], view_.group_pool.free_ids.size) ||
+         full(table_entries_, most_entries(view_.table.keys.size));
+}
+
+/// All groups of the table, into `order_`.
+uint32_t MapStorage::order_groups() {
+  uint32_t count = 0;
+  for (uint32_t slot = 0; slot < view_.table.keys.size; ++slot)
+    if (view_.table.keys[slot] != kEmptyKey && view_.table.blocks[slot] != kNoBlock)
+      order_[count++] = {view_.table.keys[slot], view_.table.blocks[slot]};
+  return count;
+}
+
+/// Gives back what a block holds.
+void MapStorage::remove(BlockRef block) {
+  if (has_id(block)) {
+    view_.block_keys[block] = kEmptyKey;
+    view_.pool.give_back(block);
+  } else if (is_partly(block)) {
+    view_.partly[payload(block)].key = kEmptyKey;
+    view_.partly_pool.give_back(payload(block));
+  }
+}
+
+void MapStorage::give_up(const TableEntry& group) {
+  if (!has_id(group.ref)) return;
+  for (const BlockRef block : view_.groups[group.ref].block) {
+    health_.dropped_blocks += has_id(block);
+    remove(block);
+  }
+  view_.group_pool.give_back(group.ref);
 }
 
 void MapStorage::drop_farthest(Vec3 centre_map) {
-  const uint32_t capacity = view_.pool.free_ids.size, keep = capacity - capacity / 10;
-  uint32_t used = 0;
-  for (BlockId id = 0; id < capacity; ++id)
-    if (view_.block_keys[id] != kEmptyKey) order_[used++] = id;
-  if (used <= keep) return;
-  // Ties by key: the same blocks go whatever their ids.
-  const auto nearer = [&](BlockId a, BlockId b) {
-    const BlockKey ka = view_.block_keys[a], kb = view_.block_keys[b];
-    const float da = distance2(centre_map, ka, view_.voxel_m), db = distance2(centre_map, kb, view_.voxel_m);
-    return da != db ? da < db : ka < kb;
-  };
-  std::nth_element(order_.begin(), order_.begin() + keep, order_.begin() + used, nearer);
-  for (uint32_t i = keep; i < used; ++i) view_.block_keys[order_[i]] = kEmptyKey;
-  health_.dropped_blocks += used - keep;
-
-  rebuild_table();
+  const auto room = [](uint32_t used, uint32_t capacity) { return used <= capacity - capacity / 10; };
+  uint32_t groups = order_groups();
+  // Ties by key: the same groups go whatever their order in the table.
+  std::sort(order_.begin(), order_.begin() + groups, [&](const TableEntry& a, const TableEntry& b) {
+    const float da = distance2(centre_map, a.key, view_.voxel_m),
+                db = distance2(centre_map, b.key, view_.voxel_m);
+    return da != db ? da < db : a.key < b.key;
+  });
+  while (groups > 0 &&
+         !(room(used_[0], view_.pool.free_ids.size) && room(used_[1], view_.group_pool.free_ids.size) &&
+           room(groups, most_entries(view_.table.keys.size))))
+    give_up(order_[--groups]);
+  rebuild_table(groups);
 }
 
-void MapStorage::rebuild_table() {
-  clear_table();
-  used_[0] = 0;
-  for (BlockId id = 0; id < view_.block_keys.size; ++id) {
-    if (view_.block_keys[id] == kEmptyKey) continue;
-    view_.pool.free_ids[used_[0]] = id;  // the next that the pool gives
-    if (view_.table.insert(view_.block_keys[id], view_.pool).answer == Insert::inserted) continue;
-    view_.block_keys[id] = kEmptyKey;
-    ++health_.table_full;
+/// Makes the table anew from `order_`: it has no removal of single keys.
+void MapStorage::rebuild_table(uint32_t groups) {
+  std::fill(view_.table.keys.begin(), view_.table.keys.end(), kEmptyKey);
+  std::fill(view_.table.blocks.begin(), view_.table.blocks.end(), kNoBlock);
+  table_entries_ = 0;
+  for (uint32_t i = 0; i < groups; ++i) {
+    if (view_.table.put(order_[i].key, order_[i].ref)) {
+      ++table_entries_;
+    } else {
+      ++health_.table_full;
+      give_up(order_[i]);
+    }
   }
-  uint32_t tail = used_[0];
-  for (BlockId id = 0; id < view_.block_keys.size; ++id)
-    if (view_.block_keys[id] == kEmptyKey) view_.pool.free_ids[tail++] = id;
 }
 
 }  // namespace stillmap

@@ -15,7 +15,7 @@ struct PlainRules {
 
   int16_t sdf(Int3 voxel) const {
     const VolumeView view = map.view();
-    const BlockId id = view.table.find(pack(block_of_voxel(voxel)));
+    const BlockId id = view.voxels_of(block_of_voxel(voxel));
     return id == kNoBlock ? kSdfUnobserved : view.blocks[id].surface[index_in_block(voxel)].sdf;
   }
   static Int3 corner(Int3 cell, int c) { return cell + Int3{c & 1, c >> 1 & 1, c >> 2}; }

@@ -287,7 +287,7 @@ class Mapper {
         if (!((view.free | view.mixed) >> bit & 1)) continue;
         const Int3 at = visible.block_at(g, bit);
         ASSERT_NE(map.block(at), nullptr);
-        list.push_back({map.view().table.find(pack(at)) | (view.free >> bit & 1 ? VisibleBlock::kFree : 0u)});
+        list.push_back({map.view().voxels_of(at) | (view.free >> bit & 1 ? VisibleBlock::kFree : 0u)});
       }
     }
     const IntegratePass pass{
@@ -427,7 +427,7 @@ TEST(IntegratePass, ABlockThatIsLongFreeSettlesAndWakesWhenASurfaceComes) {
   Mapper m;
   const VolumeView view = m.map.view();
   const auto settled = [&] {
-    const BlockId id = view.table.find(pack({0, 0, 6}));  // z from 0.96 to 1.1 m
+    const BlockId id = view.voxels_of({0, 0, 6});  // z from 0.96 to 1.1 m
     EXPECT_NE(id, kNoBlock);
     return view.settled_free[id];
   };

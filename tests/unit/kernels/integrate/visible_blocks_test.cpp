@@ -152,6 +152,52 @@ TEST(VisibleBlocks, WithoutFreeSpaceOnlyTheBandAndWhatIsThereAreListed) {
   }
 }
 
+TEST(VisibleBlocks, WithoutVoxelsInFreeSpaceOnlyTheBandAsksForVoxels) {
+  int32_t free = 0, mixed = 0, partly = 0;
+  for (uint32_t seed = 11; seed <= 13; ++seed) {
+    RandomFrame frame(seed);
+    frame.pass.dense = false;
+    const VisibleGroupPass& pass = frame.pass;
+    const auto count = static_cast<uint32_t>(pass.groups.x * pass.groups.y * pass.groups.z);
+    for (uint32_t g = 0; g < count; ++g) {
+      const GroupView view = best_loops().visible_group(pass, g), plain = pass(g, PlainVoxels{});
+      EXPECT_EQ(view.free, plain.free);
+      EXPECT_EQ(view.mixed, plain.mixed);
+      EXPECT_EQ(view.partly, plain.partly);
+      for (uint64_t bits = view.free | view.mixed | view.partly; bits; bits &= bits - 1) {
+        const int32_t bit = __builtin_ctzll(bits);
+        const Seen seen = look_at_voxels(pass, pass.block_at(g, bit));
+        const bool is_free = view.free >> bit & 1, is_mixed = view.mixed >> bit & 1;
+        EXPECT_EQ(is_mixed, seen.band > 0);
+        EXPECT_EQ(is_free, seen.free == kBlockVoxels);
+        ++(is_free ? free : is_mixed ? mixed : partly);
+      }
+    }
+  }
+  EXPECT_GT(free, 100);
+  EXPECT_GT(mixed, 50);
+  EXPECT_GT(partly, 50);
+}
+
+TEST(VisibleBlocks, WhatIsFreeForGoodIsNotListedAgain) {
+  RandomFrame frame(12);
+  frame.pass.dense = false;
+  frame.pass.enough = 3;
+  const auto count = static_cast<uint32_t>(frame.pass.groups.x * frame.pass.groups.y * frame.pass.groups.z);
+  const auto listed_free = [&](bool tell) {
+    int32_t listed = 0;
+    for (uint32_t g = 0; g < count; ++g)
+      for (uint64_t bits = best_loops().visible_group(frame.pass, g).free; bits; bits &= bits - 1, ++listed)
+        if (tell) frame.map.storage.see_free(frame.pass.block_at(g, __builtin_ctzll(bits)));
+    return listed;
+  };
+  const int32_t all = listed_free(true);
+  EXPECT_GT(all, 100);
+  EXPECT_EQ(listed_free(true), all);
+  EXPECT_EQ(listed_free(true), all);
+  EXPECT_EQ(listed_free(false), 0);
+}
+
 TEST(VisibleBlocks, NothingIsListedWhenNothingWasMeasured) {
   RandomFrame frame(5);
   const TestImage<float> nothing(kRows, kCols);

@@ -124,7 +124,7 @@ TEST(Pool, TakesEachBlockOnceAndAgainWhatWasGivenBack) {
   EXPECT_EQ(pool.take(), kNoBlock);
 }
 
-// Property: a million random operations answer what std::map answers.
+// Property: a million random operations answer what std::map answers; ten million below, from four threads.
 TEST(Hash, BehavesLikeAMap) {
   Table t(4096, 2000);
   std::map<BlockKey, BlockId> model;
@@ -195,6 +195,77 @@ TEST(Hash, FourThreadsInsertTheSameKeysWithoutDuplicates) {
       given[id] = true;
     }
   }
+}
+
+#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
+constexpr uint32_t kOperations = 1000000;  // each takes many times as long
+#else
+constexpr uint32_t kOperations = 10000000;
+#endif
+
+// Four threads, the same keys, more keys than the pool has blocks: every answer is right at its time, and
+// what stands in the table at the end is what a std::map of the answers holds.
+TEST(Hash, ManyRandomOperationsFromFourThreadsLeaveWhatTheirAnswersSay) {
+  constexpr uint32_t kThreads = 4, kPool = 5000;
+  Table t(16384, kPool);
+  const HashView table = t.table();
+  const PoolView pool = t.pool();
+  struct Answers {
+    std::map<BlockKey, BlockId> blocks;
+    uint64_t count[5] = {};
+    uint64_t wrong = 0;
+  } answers[kThreads];
+  const auto operate = [&](uint32_t id) {
+    Answers& mine = answers[id];
+    std::mt19937 random(id + 1);
+    std::uniform_int_distribution<int32_t> coordinate(-9, 9);
+    for (uint32_t i = 0; i < kOperations / kThreads; ++i) {
+      const BlockKey key = pack({coordinate(random), coordinate(random), coordinate(random)});
+      const auto known = mine.blocks.find(key);
+      if (i % 2) {
+        const BlockId found = table.find(key);
+        mine.wrong +=
+            known != mine.blocks.end() ? found != known->second : found != kNoBlock && found >= kPool;
+        continue;
+      }
+      const InsertResult r = table.insert(key, pool);
+      ++mine.count[static_cast<int>(r.answer)];
+      const bool has_block = r.answer == Insert::inserted || r.answer == Insert::existed;
+      mine.wrong += has_block != (r.block < kPool);
+      mine.wrong += known != mine.blocks.end() && (r.answer != Insert::existed || r.block != known->second);
+      if (has_block) mine.blocks[key] = r.block;
+    }
+  };
+  std::vector<std::thread> threads;
+  for (uint32_t id = 0; id < kThreads; ++id) threads.emplace_back(operate, id);
+  for (std::thread& thread : threads) thread.join();
+
+  std::map<BlockKey, BlockId> model;
+  uint64_t inserted = 0, pool_empty = 0;
+  for (const Answers& a : answers) {
+    EXPECT_EQ(a.wrong, 0u);
+    inserted += a.count[static_cast<int>(Insert::inserted)];
+    pool_empty += a.count[static_cast<int>(Insert::pool_empty)];
+    for (const auto& [key, block] : a.blocks) {
+      const auto [at, is_new] = model.emplace(key, block);
+      EXPECT_TRUE(is_new || at->second == block);
+    }
+  }
+  EXPECT_EQ(inserted, model.size());
+  EXPECT_EQ(inserted, kPool);
+  EXPECT_EQ(t.used(), kPool);
+  EXPECT_GT(pool_empty, 0u);
+  std::vector<bool> given(kPool);
+  for (int32_t z = -9; z <= 9; ++z)
+    for (int32_t y = -9; y <= 9; ++y)
+      for (int32_t x = -9; x <= 9; ++x) {
+        const auto known = model.find(pack({x, y, z}));
+        const BlockId found = table.find(pack({x, y, z}));
+        ASSERT_EQ(found, known == model.end() ? kNoBlock : known->second);
+        if (found == kNoBlock) continue;
+        EXPECT_FALSE(given[found]);
+        given[found] = true;
+      }
 }
 
 }  // namespace

@@ -50,6 +50,10 @@ class ScriptedEngine : public Engine {
     return Status::ok;
   }
   Status extract_mesh(MeshSink&) override { return Status::ok; }
+  void look_up(View<const Vec3>, View<PointState>) const override {}
+  uint32_t list_groups(View<uint64_t>) const override { return 0; }
+  uint32_t write_group(uint64_t, View<uint8_t>) const override { return 0; }
+  Status read_group(View<const uint8_t>) override { return Status::unavailable; }
   ImageView<const uint8_t> mask_image() const override { return {nullptr, 10, 20, 20}; }
   ImageView<const float> depth_image_m() const override { return {}; }
   ImageView<const Rgb8> colour_image() const override { return {}; }

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <vector>
 
+#include "kernels/map/group_record.hpp"
 #include "kernels/mask/grow_mask.hpp"
 #include "tests/support/corner_scene.hpp"
 #include "tests/support/mesh_recorder.hpp"
@@ -408,6 +409,63 @@ TEST(CpuEngine, ATinyPoolIsCountedAndFarBlocksAreDropped) {
   EXPECT_EQ(health.capacity, 300u);
   rig.mesh();
   rig.depth_of_map(k);
+}
+
+/// States of a grid of points in the box that the corner camera looks into.
+std::vector<PointState> states_of(const Engine& engine) {
+  std::vector<Vec3> points;
+  for (float z = -0.2f; z < 2.4f; z += 0.031f)
+    for (float y = -1.5f; y < 1.0f; y += 0.031f)
+      for (float x = -2.0f; x < 1.2f; x += 0.031f) points.push_back({x, y, z});
+  std::vector<PointState> states(points.size());
+  const auto count = static_cast<uint32_t>(points.size());
+  engine.look_up({points.data(), count}, {states.data(), count});
+  return states;
+}
+
+TEST(CpuEngine, BothFormsOfFreeSpaceKnowTheSameAndOneTakesAFractionOfTheMemory) {
+  EngineParams dense = small_params(), lean = small_params();
+  dense.map.free_space = FreeSpace::dense;
+  lean.map.free_space = FreeSpace::hierarchical;
+  Rig a(dense), b(lean);
+  const Intrinsics k = corner_camera(kWidth);
+  for (int n = 0; n < 80; ++n) {
+    // The box comes after the room was seen, stays a while, and goes.
+    const Se3d T = exp(Twistd{{0.1 * std::sin(0.2 * n), 0, -0.003 * n}, {0, 0.2 * std::sin(0.1 * n), 0}});
+    const CornerView view(n >= 20 && n < 30 ? with_box() : CornerScene{}, k, T);
+    for (Rig* rig : {&a, &b}) rig->add(view, cast<float>(T));
+  }
+  const std::vector<PointState> x = states_of(*a.engine), y = states_of(*b.engine);
+  uint64_t different = 0, count[3] = {};
+  for (size_t i = 0; i < x.size(); ++i) {
+    different += x[i] != y[i];
+    ++count[static_cast<int>(x[i])];
+  }
+  for (const uint64_t n : count) EXPECT_GT(n, x.size() / 50);
+  EXPECT_LT(static_cast<double>(different), 0.001 * static_cast<double>(x.size()));
+  EXPECT_LT(3 * b.engine->map_health().blocks, 2 * a.engine->map_health().blocks);
+  EXPECT_LT(static_cast<double>(b.engine->map_health().bytes),
+            1.25 * b.engine->map_health().peak_blocks * sizeof(VoxelBlock));
+  EXPECT_EQ(a.mesh().triangle_count(), b.mesh().triangle_count());
+}
+
+TEST(CpuEngine, AMapReadBackInPiecesIsTheSameMap) {
+  EngineParams p = small_params();
+  p.map.free_space = FreeSpace::hierarchical;
+  Rig from(p), to(p);
+  const Intrinsics k = corner_camera(kWidth);
+  from.add(CornerView(with_box(), k, {}), {}, 3);
+  std::vector<uint64_t> keys(20000);
+  keys.resize(from.engine->list_groups({keys.data(), 20000}));
+  std::vector<uint8_t> record(kMaxGroupRecordBytes);
+  for (const uint64_t key : keys) {
+    const uint32_t bytes = from.engine->write_group(key, {record.data(), kMaxGroupRecordBytes});
+    ASSERT_GT(bytes, 0u);
+    ASSERT_EQ(to.engine->read_group({record.data(), bytes}), Status::ok);
+  }
+  EXPECT_EQ(states_of(*from.engine), states_of(*to.engine));
+  EXPECT_TRUE(same_mesh(from.mesh(), to.mesh()));
+  EXPECT_EQ(from.depth_of_map(k), to.depth_of_map(k));
 }
 
 TEST(CpuEngine, ResetForgetsTheMap) {
