@@ -84,6 +84,20 @@ struct OdometryConfig {
   }
 };
 
+/// Where far parts of the map go when it fills up, until the robot comes back.
+struct ArchiveConfig {
+  std::string dir;
+  float max_bytes = 4e9f;
+
+  template <class F>
+  static void fields(F&& f) {
+    using P = ArchiveConfig;
+    f("dir", &P::dir, 0, 4000, "folder", "ours", "made when it is not there; empty: far parts are dropped");
+    f("max_bytes", &P::max_bytes, 1e6, 1e15, "bytes", "ours",
+      "of its files; when it is full far parts are dropped");
+  }
+};
+
 struct RecordConfig {
   bool masks = false;
   bool mesh = true;
@@ -136,6 +150,7 @@ struct Config {
   IntegrateParams integrate;
   MapParams map;
   RelocaliseParams relocalise;
+  ArchiveConfig archive;
   RecordConfig record;
   RuntimeConfig runtime;
   MemoryConfig memory;
@@ -153,6 +168,7 @@ struct Config {
     f("integrate", &Config::integrate);
     f("map", &Config::map);
     f("relocalise", &Config::relocalise);
+    f("archive", &Config::archive);
     f("record", &Config::record);
     f("runtime", &Config::runtime);
     f("memory", &Config::memory);

@@ -14,7 +14,7 @@ constexpr const char* kHeading =
 template <class T>
 std::string toml_value(const Field& field, const T& value) {
   const std::string text = value_text(field, value);
-  return std::is_enum_v<T> ? '"' + text + '"' : text;
+  return std::is_enum_v<T> || std::is_same_v<T, std::string> ? '"' + text + '"' : text;
 }
 
 /// "m, 0.01 to 10", or the names of a switch.
@@ -22,7 +22,7 @@ template <class T>
 std::string domain(const Field& field) {
   if constexpr (std::is_same_v<T, bool>) {
     return "true or false";
-  } else if constexpr (std::is_enum_v<T>) {
+  } else if constexpr (std::is_enum_v<T> || std::is_same_v<T, std::string>) {
     return field.unit;
   } else {
     const std::string unit = field.unit == std::string_view("1") ? "" : field.unit + std::string(", ");

@@ -14,8 +14,17 @@ inline EngineParams engine_params(const Config& config, CameraModel camera, floa
     camera.distortion = {c.k1, c.k2, c.p1, c.p2, c.k3};
   }
   if (c.depth_units_per_m > 0) depth_units_per_m = c.depth_units_per_m;
-  return {camera,           depth_units_per_m, config.depth,      config.track,          config.mask,
-          config.integrate, config.map,        config.relocalise, config.runtime.threads};
+  constexpr float kFetch_m = 0.5f;  // a quick turn goes so far while a group comes from the disk
+  return {camera,
+          depth_units_per_m,
+          config.depth,
+          config.track,
+          config.mask,
+          config.integrate,
+          config.map,
+          config.relocalise,
+          config.runtime.threads,
+          config.archive.dir.empty() ? 0.0f : kFetch_m};
 }
 
 }  // namespace stillmap

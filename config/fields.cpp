@@ -44,6 +44,9 @@ std::string value_text(const Field& /*field*/, float value) {
 std::string value_text(const Field& /*field*/, int32_t value) {
   return std::to_string(value);
 }
+std::string value_text(const Field& /*field*/, const std::string& value) {
+  return value;
+}
 std::string value_text(const Field& /*field*/, bool value) {
   return value ? "true" : "false";
 }

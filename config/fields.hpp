@@ -16,7 +16,7 @@ namespace stillmap {
 struct Field {
   const char* section;
   const char* key;
-  double lowest, highest;  ///< allowed range, both ends included
+  double lowest, highest;  ///< allowed range, both ends included; of a text: its length
   const char* unit;        ///< for a switch with names: the names, separated by '|'
   const char* paper;       ///< section, equation or table of the paper, or "ours"
   const char* text;
@@ -25,7 +25,7 @@ struct Field {
 };
 
 /// Calls `f(const Field&, value&)` for each setting of `config` in the order of the files.
-/// `value` is float, int32_t, bool, a list of floats or one of the enums with names.
+/// `value` is float, int32_t, bool, text, a list of floats or one of the enums with names.
 template <class ConfigT, class F>
 void for_each_field(ConfigT& config, F&& f) {
   Config::sections([&](const char* section, auto section_member) {
@@ -49,6 +49,7 @@ std::string bound_text(double value);
 std::string value_text(const Field& field, float value);
 std::string value_text(const Field& field, int32_t value);
 std::string value_text(const Field& field, bool value);
+std::string value_text(const Field& field, const std::string& value);
 /// "[1.0, 2.0]"
 template <size_t N>
 std::string value_text(const Field& field, const std::array<float, N>& values) {

@@ -66,6 +66,18 @@ Complaint from_toml(const Field& /*field*/, const toml::node& node, bool& out) {
   out = *value;
   return {};
 }
+/// What would break a line of a file, or its quotes, is no part of a name.
+Complaint store(std::string_view text, std::string& out) {
+  for (const char c : text)
+    if (static_cast<unsigned char>(c) < ' ' || c == '"' || c == '\\')
+      return "expected a text without quotes, backslashes and control characters";
+  out = text;
+  return {};
+}
+Complaint from_toml(const Field& /*field*/, const toml::node& node, std::string& out) {
+  const auto text = node.value_exact<std::string>();
+  return text ? store(std::string_view(*text), out) : Complaint("expected a text in quotes");
+}
 template <size_t N>
 Complaint from_toml(const Field& field, const toml::node& node, std::array<float, N>& out) {
   const toml::array* list = node.as_array();
@@ -104,6 +116,10 @@ Complaint from_text(const Field& /*field*/, std::string_view text, bool& out) {
   if (text != "true" && text != "false") return "expected true or false";
   out = text == "true";
   return {};
+}
+Complaint from_text(const Field& /*field*/, std::string_view text, std::string& out) {
+  if (text.size() >= 2 && text.front() == '"' && text.back() == '"') text = text.substr(1, text.size() - 2);
+  return store(text, out);
 }
 /// "1,2,3", or as in a file: "[1, 2, 3]".
 template <size_t N>

@@ -34,6 +34,9 @@ bool in_range(T value, const Field& field) {
     return static_cast<double>(value) >= field.lowest && static_cast<double>(value) <= field.highest;
 }
 
+bool in_range(const std::string& value, const Field& field) {
+  return in_range(static_cast<double>(value.size()), field);
+}
 template <size_t N>
 bool in_range(const std::array<float, N>& values, const Field& field) {
   return std::all_of(values.begin(), values.end(), [&](float value) { return in_range(value, field); });
@@ -105,6 +108,12 @@ void check_map(const MapParams& map, Violations& out) {
                        " (4 to 24 times map.voxel_m = " + float_text(map.voxel_m) + ")");
 }
 
+void check_archive(const Config& config, Violations& out) {
+  out.unless(config.archive.dir.empty() || config.map.free_space == FreeSpace::hierarchical,
+             "archive.dir = \"" + config.archive.dir +
+                 "\": wants map.free_space = \"hierarchical\"; dense free space would fill the disk");
+}
+
 void check_source(const SourceConfig& source, Violations& out) {
   out.unless(source.wait_s >= 0 || source.wait_s == -1,
              setting("source.wait_s", source.wait_s) + ": allowed 0 and above, or -1 for ever");
@@ -129,6 +138,7 @@ std::vector<std::string> violations(const Config& config) {
   check_depth(config, out);
   check_track(config, out);
   check_map(config.map, out);
+  check_archive(config, out);
   check_missing_parts(config, out);
   return out.take();
 }

@@ -24,6 +24,7 @@ struct EngineParams {
   MapParams map;
   RelocaliseParams relocalise;
   int32_t threads = 2;  ///< CPU engine: 1..64, the calling thread included
+  float fetch_m = 0;    ///< with an archive: so near to the view its groups are wanted back
 };
 
 /// One line of the memory plan.
@@ -81,11 +82,13 @@ struct MapHealth {
   uint32_t blocks = 0;  ///< in use
   uint32_t capacity = 0;
   uint32_t peak_blocks = 0;
-  uint64_t dropped_blocks = 0;  ///< far blocks given up because the pool was full
-  uint64_t contended = 0;       ///< insertions answered `contended`
-  uint64_t table_full = 0;      ///< insertions answered `table_full`
-  uint64_t pool_empty = 0;      ///< insertions answered `pool_empty`
-  uint64_t bytes = 0;           ///< peak bytes of blocks and their table entries
+  uint64_t dropped_blocks = 0;   ///< far blocks given up because the pool was full
+  uint64_t contended = 0;        ///< insertions answered `contended`
+  uint64_t table_full = 0;       ///< insertions answered `table_full`
+  uint64_t pool_empty = 0;       ///< insertions answered `pool_empty`
+  uint64_t bytes = 0;            ///< peak bytes of blocks and their table entries
+  uint32_t archived_groups = 0;  ///< groups of blocks that are in the archive now
+  float fill = 0;                ///< of the fullest of the pools, 0..1
 };
 
 struct IntegrateResult {
@@ -106,6 +109,12 @@ struct ViewCheck {
   float luma_correlation = 0;     ///< of measured and mapped luminance over the cells `on`, -1..1
   float texture_correlation = 0;  ///< the same of the differences between neighbouring cells
   float weakest_m = 0;  ///< standard deviation of the worst bound direction for 1 cm of noise in every cell
+};
+
+/// A group of blocks that is in the archive.
+struct ArchivedGroup {
+  uint64_t key;
+  uint32_t entry;  ///< as put_away was told
 };
 
 /// What the map knows of a point, by the voxel next to it.
@@ -178,6 +187,17 @@ class Engine {
   /// Puts a group into the map, in place of what is known there.
   /// @return bad_data: not a record; capacity_exhausted: no room, nothing was changed
   virtual Status read_group(View<const uint8_t> record) = 0;
+
+  /// Groups with blocks that the last integrated frame does not come near, the farthest from `centre_map`
+  /// first. @return how many
+  virtual uint32_t farthest_groups(Vec3 centre_map, View<uint64_t> keys) = 0;
+  /// Frees the blocks of a group that was written to the archive; until read_group brings it back the map
+  /// knows nothing of it, and frames leave it as it is.
+  virtual void put_away(uint64_t key, uint32_t entry) = 0;
+  /// The archive has lost the group: what it held is unknown.
+  virtual void forget_group(uint64_t key) = 0;
+  /// Groups of the archive that came into view, or near it, in the last integrated frame. @return how many
+  virtual uint32_t wanted_groups(View<ArchivedGroup> groups) const = 0;
 
   /// 255: dynamic. Size of the camera; valid until the next `prepare`.
   virtual ImageView<const uint8_t> mask_image() const = 0;

@@ -19,10 +19,14 @@
 #include "firmware-like/commands/run_options.hpp"
 #include "firmware-like/commands/run_outputs.hpp"
 #include "firmware-like/commands/stop_signal.hpp"
+#include "runtime/archive/block_archive.hpp"
 #include "runtime/core/heap_guard.hpp"
 
 namespace stillmap {
 namespace {
+
+/// Of map.high_water: between them there is room for what comes while the archive writes.
+constexpr float kArchiveBelow = 0.9f;
 
 /// Opens the source, waiting source.wait_s for it to appear.
 Result<std::unique_ptr<FrameSource>> open_waiting(const std::string& name, const Config& config) {
@@ -44,6 +48,14 @@ int64_t expected_frames(const SourceInfo& info, const RunOptions& o) {
   if (info.frames < 0) return o.max_frames > 0 ? o.max_frames : -1;
   const int64_t left = std::max<int64_t>(info.frames - o.skip_frames, 0);
   return o.max_frames > 0 ? std::min<int64_t>(left, o.max_frames) : left;
+}
+
+BlockArchive::Options archive_options(const Config& config) {
+  BlockArchive::Options options;
+  options.dir = config.archive.dir;
+  options.max_bytes = static_cast<uint64_t>(config.archive.max_bytes);
+  options.keep_below = kArchiveBelow * config.map.high_water;
+  return options;
 }
 
 void print_summary(const RunOptions& o, const RunOutputs& outputs, const PipelineCounters& counters,
@@ -106,14 +118,21 @@ int run(const RunOptions& o, FrameObserver* observer) {
   if (!outputs) return fail(outputs.error(), ErrorKind::failed);
   (*outputs)->event(Stamp{}, "start", fmt::format("{}, cpu engine, {} threads", info.name, params.threads));
 
+  std::unique_ptr<BlockArchive> archive;
+  if (!config.archive.dir.empty()) {
+    auto made = BlockArchive::open(archive_options(config));
+    if (!made) return fail(made.error(), ErrorKind::failed);
+    archive = std::move(*made);
+  }
+
   if (observer) observer->begin(source, info);
   FrameSlot slot(info);
   Pipeline pipeline(*engine, config, plan->T_map_cam, source.odometry());
   Progress progress(frames, o.quiet);
-  const LoopEnd end =
-      run_loop(source, *engine, pipeline, **outputs, progress, slot.frame(), o.max_frames, observer);
+  const LoopEnd end = run_loop(source, *engine, pipeline, **outputs, progress, slot.frame(), o.max_frames,
+                               observer, archive.get());
   const double seconds = progress.seconds();
-  (*outputs)->finish(*engine, source, pipeline.counters());
+  (*outputs)->finish(*engine, source, pipeline.counters(), archive.get());
   if (!o.quiet) print_summary(o, **outputs, pipeline.counters(), seconds);
   std::fflush(stdout);
   return exit_code_of(end, **outputs, pipeline.counters());

@@ -14,9 +14,12 @@ namespace {
 constexpr int32_t kWaitMs = 100;  ///< how long a stop signal may go unseen while no frame comes
 constexpr std::chrono::seconds kReportPeriod{60};
 
-FrameResult process_guarded(Pipeline& pipeline, const RgbdFrame& frame) {
+FrameResult process_guarded(Pipeline& pipeline, const RgbdFrame& frame, Engine& engine,
+                            BlockArchive* archive) {
   const heap_guard::Scope armed;
-  return pipeline.process(frame);
+  const FrameResult result = pipeline.process(frame);
+  if (archive) archive->step(engine, cast<float>(result.T_map_cam).translation);
+  return result;
 }
 
 /// Stamps have to rise: what comes after the pipeline (files, filters) relies on it.
@@ -32,7 +35,8 @@ std::string jump_text(const RgbdFrame& frame, Stamp last) {
 }  // namespace
 
 LoopEnd run_loop(FrameSource& source, Engine& engine, Pipeline& pipeline, RunOutputs& outputs,
-                 Progress& progress, RgbdFrame& slot, uint32_t max_frames, FrameObserver* observer) {
+                 Progress& progress, RgbdFrame& slot, uint32_t max_frames, FrameObserver* observer,
+                 BlockArchive* archive) {
   LoopEnd end;
   Stamp last;
   auto report_due = std::chrono::steady_clock::now() + kReportPeriod;
@@ -50,7 +54,7 @@ LoopEnd run_loop(FrameSource& source, Engine& engine, Pipeline& pipeline, RunOut
       outputs.bad_frame(last, status == Status::bad_data ? source.error() : jump_text(slot, last));
       continue;
     }
-    const FrameResult result = process_guarded(pipeline, slot);
+    const FrameResult result = process_guarded(pipeline, slot, engine, archive);
     last = result.stamp;
     end.state = result.state;
     outputs.add(slot, result, engine);

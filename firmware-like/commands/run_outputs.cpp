@@ -7,6 +7,8 @@
 #include <utility>
 
 #include "config/describe.hpp"
+#include "config/engine_params.hpp"
+#include "runtime/archive/whole_mesh.hpp"
 #include "runtime/image/image_file.hpp"
 #include "runtime/record/output_file.hpp"
 #include "runtime/record/ply_writer.hpp"
@@ -174,13 +176,17 @@ void RunOutputs::rewrite_report(const PipelineCounters& counters) {
   if (files_) tell(write_whole_file(files_->folder.path("report.json"), report_.json()));
 }
 
-void RunOutputs::write_mesh(Engine& engine) {
+void RunOutputs::write_mesh(Engine& engine, BlockArchive* archive) {
   const auto start = std::chrono::steady_clock::now();
   PlyWriter writer(files_->folder.path("mesh.ply"));
-  const Status status = engine.extract_mesh(writer);
+  std::string error;
+  if (archive && archive->counters().groups > 0)
+    error = extract_whole_mesh(engine, *archive, engine_params(config_, source_.camera, 0),
+                               config_.archive.dir, writer);
+  else if (const Status status = engine.extract_mesh(writer); status != Status::ok)
+    error = to_string(status);
   if (!writer.close()) return tell(writer.error());
-  if (status != Status::ok)
-    tell(files_->folder.path("mesh.ply") + ": the mesh could not be extracted: " + to_string(status));
+  if (!error.empty()) tell(files_->folder.path("mesh.ply") + ": the mesh could not be extracted: " + error);
   mesh_seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   mesh_triangles_ = writer.triangle_count();
   events_.info(last_stamp_, "mesh",
@@ -188,10 +194,23 @@ void RunOutputs::write_mesh(Engine& engine) {
                            mesh_seconds_));
 }
 
-void RunOutputs::finish(Engine& engine, const FrameSource& source, const PipelineCounters& counters) {
+void RunOutputs::note_archive(const BlockArchive& archive) {
+  const ArchiveCounters& c = archive.counters();
+  events_.info(last_stamp_, "archive",
+               fmt::format("{} groups of blocks stored, {} brought back, {} MB in {} files now", c.stored,
+                           c.restored, c.bytes / 1000000, c.groups));
+  if (c.refused > 0)
+    events_.fault(last_stamp_, "archive_full",
+                  fmt::format("{} groups could not be stored; raise archive.max_bytes", c.refused));
+  if (c.failed > 0) events_.fault(last_stamp_, "archive_failed", archive.last_error());
+}
+
+void RunOutputs::finish(Engine& engine, const FrameSource& source, const PipelineCounters& counters,
+                        BlockArchive* archive) {
   report_.set_map(engine.map_health());
+  if (archive) note_archive(*archive);
   if (files_) {
-    if (record_.mesh) write_mesh(engine);
+    if (record_.mesh) write_mesh(engine, archive);
     if (const auto cloud = source.truth_cloud(); !cloud.empty() && truth_.anchored())
       tell(write_point_cloud(files_->folder.path("truth_cloud.ply"), in_map_frame(truth_, cloud)));
   }

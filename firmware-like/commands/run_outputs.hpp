@@ -10,6 +10,7 @@
 #include "config/config.hpp"
 #include "config/result.hpp"
 #include "kernels/engine.hpp"
+#include "runtime/archive/block_archive.hpp"
 #include "runtime/pipeline/pipeline.hpp"
 #include "runtime/ports/frame_source.hpp"
 #include "runtime/record/events_log.hpp"
@@ -39,7 +40,9 @@ class RunOutputs {
   void fault(Stamp stamp, const char* name, const std::string& text) { events_.fault(stamp, name, text); }
   void rewrite_report(const PipelineCounters& counters);
   /// Mesh, true cloud, report; closes the streams.
-  void finish(Engine& engine, const FrameSource& source, const PipelineCounters& counters);
+  /// @param archive null: there is none
+  void finish(Engine& engine, const FrameSource& source, const PipelineCounters& counters,
+              BlockArchive* archive);
 
   bool failed() const { return !told_.empty(); }
   uint64_t fault_count(const std::string& name) const;
@@ -64,7 +67,8 @@ class RunOutputs {
   void add_images(const RgbdFrame& frame, const FrameResult& result, Engine& engine);
   void add_snapshot(const FrameResult& result, Engine& engine);
   bool snapshot_due();
-  void write_mesh(Engine& engine);
+  void write_mesh(Engine& engine, BlockArchive* archive);
+  void note_archive(const BlockArchive& archive);
 
   RecordConfig record_;
   Config config_;

@@ -59,9 +59,10 @@ STILLMAP_HD CubeGeometry cube_geometry(int32_t voxels, float voxel_m) {
 
 /// What a frame does to one group of blocks: a bit a block.
 struct GroupView {
-  uint64_t free = 0;    ///< all of the block is seen free, and that says something new
-  uint64_t mixed = 0;   ///< needs voxels
-  uint64_t partly = 0;  ///< has no voxels and needs none: some of it is seen free
+  uint64_t free = 0;             ///< all of the block is seen free, and that says something new
+  uint64_t mixed = 0;            ///< needs voxels
+  uint64_t partly = 0;           ///< has no voxels and needs none: some of it is seen free
+  BlockRef archived = kNoBlock;  ///< the group is in the archive and comes into view
 };
 
 /// Classifies the blocks of one group (4x4x4).
@@ -75,6 +76,7 @@ struct VisibleGroupPass {
   bool free_space;       ///< false: free space is not stored, only what is in the map is carved
   bool dense = true;     ///< free space is stored in voxels (paper III-D)
   uint32_t enough = 64;  ///< looks at a free block without voxels, after which more say nothing new
+  float margin_m = 0;    ///< around the view, from which on groups are fetched from the archive
 
   STILLMAP_HD Int3 group_at(uint32_t index) const {
     const int32_t i = static_cast<int32_t>(index);
@@ -89,10 +91,15 @@ struct VisibleGroupPass {
   STILLMAP_HD GroupView operator()(uint32_t group_index, const Voxels& voxels) const {
     GroupView view;
     const Int3 at = group_at(group_index);
-    const BlockView whole = look(block_in_group(at, 0), cube_geometry(kGroupEdge * kBlockEdge, map.voxel_m));
+    const BlockRef group = map.table.find(pack(at));
+    // Nothing is told to a group that is away: what it held is not to be made anew beside it.
+    if (is_archived(group)) {
+      if (comes_into_view(at)) view.archived = group;
+      return view;
+    }
+    const BlockView whole = look(block_in_group(at, 0), group_cube());
     if (whole == BlockView::nothing) return view;
     const CubeGeometry cube = cube_geometry(kBlockEdge, map.voxel_m);
-    const BlockRef group = map.table.find(pack(at));
     if (whole == BlockView::free && settled(group)) return view;
     for (int32_t bit = 0; bit < kGroupBlocks; ++bit) {
       const Int3 block = block_in_group(at, bit);
@@ -103,7 +110,15 @@ struct VisibleGroupPass {
     return view;
   }
 
+  /// In view, or within `margin_m` of it.
+  STILLMAP_HD bool comes_into_view(Int3 group) const {
+    CubeGeometry cube = group_cube();
+    cube.radius_m += margin_m;
+    return look(block_in_group(group, 0), cube) != BlockView::nothing;
+  }
+
  private:
+  STILLMAP_HD CubeGeometry group_cube() const { return cube_geometry(kGroupEdge * kBlockEdge, map.voxel_m); }
   STILLMAP_HD bool settled(BlockRef ref) const { return is_free(ref) && payload(ref) >= enough; }
 
   template <class Voxels>

@@ -13,7 +13,8 @@ namespace stillmap {
 /// The state of a block (or, in the table, of a whole group). The two top bits say which:
 ///   00  it has voxels (a group: it has blocks of different states); the rest is the id in the pool
 ///   01  free throughout and no voxels; the rest is how often that was seen
-///   10  seen free in part and no voxels; the rest is the id of which voxels (SeenVoxels)
+///   10  seen free in part and no voxels; the rest is the id of which voxels (SeenVoxels). A group: it is in
+///       the archive; the rest is the number of its entry there
 ///   11  kNoBlock: nothing is known; HashView::kPending
 using BlockRef = uint32_t;
 constexpr BlockRef kFreeRef = 1u << 30;
@@ -29,6 +30,13 @@ STILLMAP_HD bool is_free(BlockRef ref) {
 }
 STILLMAP_HD bool is_partly(BlockRef ref) {
   return (ref & ~kRefPayload) == kPartlyRef;
+}
+/// Of a group.
+STILLMAP_HD bool is_archived(BlockRef ref) {
+  return (ref & ~kRefPayload) == kPartlyRef;
+}
+STILLMAP_HD BlockRef archived_ref(uint32_t entry) {
+  return kPartlyRef | entry;
 }
 STILLMAP_HD uint32_t payload(BlockRef ref) {
   return ref & kRefPayload;

@@ -33,7 +33,8 @@ struct VolumeView {
   /// @return of a block: has_id, is_free, is_partly, or kNoBlock.  @thread any, also while others insert
   STILLMAP_HD BlockRef ref_of(Int3 block) const {
     const BlockRef group = table.find(pack(group_of_block(block)));
-    return has_id(group) ? groups[group].block[index_in_group(block)] : group;
+    if (has_id(group)) return groups[group].block[index_in_group(block)];
+    return is_free(group) ? group : kNoBlock;
   }
   /// @return kNoBlock when the block has no voxels
   STILLMAP_HD BlockId voxels_of(Int3 block) const {

@@ -71,7 +71,7 @@ std::string Report::json() const {
                          {"free_blocks", map_.capacity - map_.blocks},
                          {"capacity", map_.capacity},
                          {"bytes", map_.bytes},
-                         {"archived", 0}}},
+                         {"archived", map_.archived_groups}}},
                        {"memory", {{"planned_bytes", planned_bytes_}, {"peak_rss_bytes", peak_rss_bytes()}}},
                        {"heap_allocations_in_loop", heap_allocations_},
                        {"deadline_misses", deadline_misses_},

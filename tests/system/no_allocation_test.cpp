@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdlib>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -14,6 +15,7 @@
 
 #include "config/engine_params.hpp"
 #include "drivers/registry.hpp"
+#include "runtime/archive/block_archive.hpp"
 #include "runtime/core/heap_guard.hpp"
 #include "runtime/pipeline/pipeline.hpp"
 #include "tests/support/frame_memory.hpp"
@@ -121,6 +123,32 @@ TEST_F(RealTimeLoop, DoesNotAllocateIn300FramesWorkersIncluded) {
   EXPECT_EQ(allocations_, 0u);
   EXPECT_EQ(pipeline_->counters().frames, 300u);
   EXPECT_GT(engine_->map_health().blocks, 100u);  // it did map
+}
+
+TEST_F(RealTimeLoop, DoesNotAllocateWhileTheArchiveRuns) {
+  Config config;
+  config.map.pool_blocks = 20000;
+  config.map.voxel_m = 0.04f;
+  config.map.truncation_m = 0.16f;
+  config.map.free_space = FreeSpace::hierarchical;
+  config.archive.dir = "no_allocation_test.archive";  // the folder that is opened below
+  ASSERT_NO_FATAL_FAILURE(start(config, "synthetic:loop,size=160x120"));
+  BlockArchive::Options options;
+  options.dir = config.archive.dir;
+  options.max_bytes = 1000000000;
+  options.keep_below = 0;  // all that is out of view goes, and comes back
+  auto archive = BlockArchive::open(options);
+  ASSERT_TRUE(archive) << archive.error();
+  for (int i = 0; i < 300; ++i) {
+    ASSERT_NO_FATAL_FAILURE(next());
+    process();
+    allocations_ += allocations_of([&] { (*archive)->step(*engine_, {}); });
+  }
+  EXPECT_EQ(allocations_, 0u);
+  EXPECT_GT((*archive)->counters().stored, 10u);
+  EXPECT_EQ((*archive)->counters().failed, 0u);
+  archive->reset();
+  std::filesystem::remove_all(options.dir);
 }
 
 TEST_F(RealTimeLoop, DoesNotAllocateWhileLostAndFindingItselfAgain) {

@@ -1,19 +1,28 @@
 #include "kernels/backend/cpu/arena.hpp"
 
+#include <fcntl.h>
 #include <sys/mman.h>
+#include <unistd.h>
 
 #include <cassert>
 
 namespace stillmap {
 
 Arena::Arena(uint64_t bytes) : size_(bytes) {
-  void* memory =
-      mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
-  if (memory == MAP_FAILED) {
-    failed_ = true;
-    return;
-  }
-  base_ = static_cast<std::byte*>(memory);
+  map_memory(MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1);
+}
+
+Arena::Arena(uint64_t bytes, const char* dir) : size_(bytes) {
+  const int file = open(dir, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
+  failed_ = file < 0 || ftruncate(file, static_cast<off_t>(bytes)) != 0;
+  if (!failed_) map_memory(MAP_SHARED, file);
+  if (file >= 0) close(file);
+}
+
+void Arena::map_memory(int flags, int file) {
+  void* memory = mmap(nullptr, size_, PROT_READ | PROT_WRITE, flags, file, 0);
+  failed_ = memory == MAP_FAILED;
+  if (!failed_) base_ = static_cast<std::byte*>(memory);
 }
 
 Arena::~Arena() {

@@ -17,6 +17,8 @@ class Arena {
   Arena() = default;
   /// Maps `bytes`; pages come from the system when first touched.
   explicit Arena(uint64_t bytes);
+  /// The same in a file of its own in `dir`, already without a name: the system may move its pages there.
+  Arena(uint64_t bytes, const char* dir);
   ~Arena();
   Arena(const Arena&) = delete;
   Arena& operator=(const Arena&) = delete;
@@ -39,6 +41,7 @@ class Arena {
   }
 
  private:
+  void map_memory(int flags, int file);
   void* take_bytes(const char* name, uint64_t bytes);
   void note(const char* name, uint64_t bytes);
 

@@ -62,7 +62,8 @@ float group_m(const MapParams& map) {
 
 /// Groups that the largest view box can hold: its edges are at most the view's longest diagonal.
 uint64_t max_groups(const EngineParams& p) {
-  const auto edge = static_cast<uint64_t>(std::ceil(1.2f * reach_m(p) / group_m(p.map))) + 3;
+  const auto edge =
+      static_cast<uint64_t>(std::ceil((1.2f * reach_m(p) + 2.0f * p.fetch_m) / group_m(p.map))) + 3;
   return edge * edge * edge;
 }
 
@@ -214,6 +215,14 @@ class CpuEngine final : public Engine {
     return memory_.map.write_group(key, record);
   }
   Status read_group(View<const uint8_t> record) override { return memory_.map.read_group(record); }
+  uint32_t farthest_groups(Vec3 centre_map, View<uint64_t> keys) override {
+    if (groups_looked_at_ == 0) return 0;  // nothing was integrated yet
+    return memory_.map.farthest_groups(centre_map, keys,
+                                       [&](BlockKey key) { return last_view_.comes_into_view(unpack(key)); });
+  }
+  void put_away(uint64_t key, uint32_t entry) override { memory_.map.put_away(key, entry); }
+  void forget_group(uint64_t key) override { memory_.map.forget_group(key); }
+  uint32_t wanted_groups(View<ArchivedGroup> groups) const override;
 
   ImageView<const uint8_t> mask_image() const override { return memory_.mask; }
   ImageView<const float> depth_image_m() const override { return memory_.depth_m; }
@@ -223,6 +232,7 @@ class CpuEngine final : public Engine {
     memory_.map.clear();
     memory_.relocaliser.clear();
     forget_cells();
+    groups_looked_at_ = 0;
   }
 
  private:
@@ -261,7 +271,9 @@ class CpuEngine final : public Engine {
   CpuMemory memory_;
   const CpuLoops& loops_;
   ThreadPool pool_;
-  int32_t frames_ = 0;  ///< integrated, modulo 2^16
+  int32_t frames_ = 0;          ///< integrated, modulo 2^16
+  VisibleGroupPass last_view_;  ///< of the last integrated frame
+  uint32_t groups_looked_at_ = 0;
   float usual_ = 1.0f;
   Se3 T_before_;        ///< pose of the last mask
   uint32_t masks_ = 0;  ///< masks made since the map was empty
@@ -545,7 +557,9 @@ VisibleGroupPass CpuEngine::visible_pass(const Se3& T_map_cam, const FrameGeomet
     low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
     high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
   }
-  const float inv = 1.0f / group_m(params_.map);
+  const float around_m = params_.fetch_m, inv = 1.0f / group_m(params_.map);
+  low = low - Vec3{around_m, around_m, around_m};
+  high = high + Vec3{around_m, around_m, around_m};
   const auto cell = [&](float x) { return static_cast<int32_t>(std::floor(x * inv)); };
   const Int3 first = {cell(low.x), cell(low.y), cell(low.z)},
              last = {cell(high.x), cell(high.y), cell(high.z)};
@@ -557,7 +571,8 @@ VisibleGroupPass CpuEngine::visible_pass(const Se3& T_map_cam, const FrameGeomet
           {last.x - first.x + 1, last.y - first.y + 1, last.z - first.z + 1},
           params_.integrate.free_space,
           dense(),
-          static_cast<uint32_t>(params_.integrate.weight_cap)};
+          static_cast<uint32_t>(params_.integrate.weight_cap),
+          params_.fetch_m};
 }
 
 /// Lists the visible blocks, in an order that does not depend on threads; makes those that are new.
@@ -567,6 +582,7 @@ Status CpuEngine::list_visible(const VisibleGroupPass& pass, uint32_t& visible_c
                           static_cast<uint64_t>(pass.groups.z);
   const uint32_t count = static_cast<uint32_t>(std::min<uint64_t>(wanted, memory_.groups.size));
   if (count < wanted) status = Status::capacity_exhausted;
+  groups_looked_at_ = count;
   pool_.for_each((count + kGroupsPerTile - 1) / kGroupsPerTile, [&](uint32_t tile) {
     const uint32_t end = std::min((tile + 1) * kGroupsPerTile, count);
     for (uint32_t g = tile * kGroupsPerTile; g < end; ++g) memory_.groups[g] = loops_.visible_group(pass, g);
@@ -605,8 +621,7 @@ void CpuEngine::merge_free(const VisibleGroupPass& pass, View<const VisibleBlock
     else if (pass.map.settled_free[block.id()] == kNoSurfaceLeft)
       memory_.map.release_voxels(block.id());
   }
-  const uint32_t groups = static_cast<uint32_t>(pass.groups.x * pass.groups.y * pass.groups.z);
-  for (uint32_t g = 0; g < std::min(groups, memory_.groups.size); ++g)
+  for (uint32_t g = 0; g < groups_looked_at_; ++g)
     if (memory_.groups[g].free) memory_.map.merge_group(pass.group_at(g));
 }
 
@@ -621,6 +636,7 @@ IntegrateResult CpuEngine::integrate(const Se3& T_world_cam) {
                                params_.depth.min_m,          params_.depth.max_m,
                                params_.integrate.free_max_m, params_.map.truncation_m};
   const VisibleGroupPass visible = visible_pass(T_world_cam, geometry);
+  last_view_ = visible;
   const Status listed = list_visible(visible, result.visible_blocks);
   if (listed != Status::ok) result.status = listed;
   const IntegratePass pass{memory_.map.view(),
@@ -641,6 +657,14 @@ IntegrateResult CpuEngine::integrate(const Se3& T_world_cam) {
   if (!dense()) merge_free(visible, blocks);
   result.map = memory_.map.health();
   return result;
+}
+
+uint32_t CpuEngine::wanted_groups(View<ArchivedGroup> groups) const {
+  uint32_t count = 0;
+  for (uint32_t g = 0; g < groups_looked_at_ && count < groups.size; ++g)
+    if (const BlockRef archived = memory_.groups[g].archived; archived != kNoBlock)
+      groups[count++] = {pack(last_view_.group_at(g)), payload(archived)};
+  return count;
 }
 
 void CpuEngine::look_up(View<const Vec3> points_map_m, View<PointState> states) const {

@@ -13,18 +13,19 @@ namespace {
 constexpr uint64_t kBlocksPerGroup = 4;
 constexpr uint64_t kFewestGroups = 1024;
 constexpr uint64_t kBlocksPerPartly = 2;
-/// Groups that are free throughout take a slot and nothing else.
+/// Groups that are free throughout, or in the archive, take a slot and nothing else.
+constexpr uint64_t kSlotsPerBlock = 2;
 constexpr uint64_t kFewestSlots = 16;
 
 uint32_t table_slots(uint64_t pool_blocks) {
-  return static_cast<uint32_t>(std::bit_ceil(std::max(pool_blocks, kFewestSlots)));
+  return static_cast<uint32_t>(std::bit_ceil(std::max(kSlotsPerBlock * pool_blocks, kFewestSlots)));
 }
 /// Chains stay short.
 uint32_t most_entries(uint32_t slots) {
   return slots / 2;
 }
 
-void fill(VoxelBlock& block, VoxelSurface surface, VoxelRecord record) {
+void fill_voxels(VoxelBlock& block, VoxelSurface surface, VoxelRecord record) {
   std::fill_n(block.surface, kBlockVoxels, surface);
   std::fill_n(block.record, kBlockVoxels, record);
 }
@@ -103,8 +104,9 @@ void MapStorage::clear() {
   std::fill(view_.block_keys.begin(), view_.block_keys.end(), kEmptyKey);
   for (SeenVoxels& seen : view_.partly) seen.key = kEmptyKey;
   for (const PoolView* pool : {&view_.pool, &view_.group_pool, &view_.partly_pool}) fill_pool(*pool);
-  fill(free_block_[0], {kSdfMax, 0}, seen_often(255));
+  fill_voxels(free_block_[0], {kSdfMax, 0}, seen_often(255));
   table_entries_ = 0;
+  health_.archived_groups = 0;
 }
 
 uint64_t MapStorage::bytes_in_use() const {
@@ -121,6 +123,7 @@ void MapStorage::note_peak() {
 MapHealth MapStorage::health() const {
   MapHealth h = health_;
   h.blocks = used_[0];
+  h.fill = fill();
   return h;
 }
 
@@ -137,6 +140,7 @@ BlockGroup* MapStorage::open_group(Int3 group) {
   BlockRef* const known = view_.table.slot_of(key);
   const BlockRef was = known ? *known : kNoBlock;
   if (has_id(was)) return &view_.groups[was];
+  const BlockRef blocks_were = is_free(was) ? was : kNoBlock;  // those of an archived one come later
   if (known) *known = kNoBlock;
   const InsertResult made = view_.table.insert(key, view_.group_pool);
   if (!count(made.answer)) {
@@ -145,7 +149,8 @@ BlockGroup* MapStorage::open_group(Int3 group) {
   }
   table_entries_ += was == kNoBlock;
   BlockGroup& blocks = view_.groups[made.block];
-  std::fill_n(blocks.block, kGroupBlocks, was);
+  std::fill_n(blocks.block, kGroupBlocks, blocks_were);
+  health_.archived_groups -= is_archived(was);
   note_peak();
   return &blocks;
 }
@@ -166,9 +171,9 @@ InsertResult MapStorage::insert(BlockKey key) {
     return {Insert::pool_empty, kNoBlock};
   }
   VoxelBlock& block = view_.blocks[id];
-  fill(block, {}, {});
+  fill_voxels(block, {}, {});
   if (is_free(*ref)) {
-    fill(block, {kSdfMax, 0}, seen_often(payload(*ref)));
+    fill_voxels(block, {kSdfMax, 0}, seen_often(payload(*ref)));
   } else if (is_partly(*ref)) {
     const SeenVoxels& seen = view_.partly[payload(*ref)];
     for (int32_t i = 0; i < kBlockVoxels; ++i) {
@@ -188,7 +193,7 @@ InsertResult MapStorage::insert(BlockKey key) {
 bool MapStorage::see_group_free(Int3 group) {
   const BlockKey key = pack(group);
   BlockRef* const ref = view_.table.slot_of(key);
-  if (ref && has_id(*ref)) return false;
+  if (ref && (has_id(*ref) || is_archived(*ref))) return false;
   if (ref && is_free(*ref)) {
     *ref = free_ref(looks_more(payload(*ref)));
     return true;
@@ -279,7 +284,8 @@ void MapStorage::merge_group(Int3 group) {
 uint32_t MapStorage::list_groups(View<BlockKey> keys) const {
   uint32_t count = 0;
   for (uint32_t slot = 0; slot < view_.table.keys.size; ++slot) {
-    if (view_.table.keys[slot] == kEmptyKey || view_.table.blocks[slot] == kNoBlock) continue;
+    const BlockRef group = view_.table.blocks[slot];
+    if (view_.table.keys[slot] == kEmptyKey || group == kNoBlock || is_archived(group)) continue;
     if (count < keys.size) keys[count] = view_.table.keys[slot];
     ++count;
   }
@@ -289,7 +295,7 @@ uint32_t MapStorage::list_groups(View<BlockKey> keys) const {
 
 uint32_t MapStorage::write_group(BlockKey key, View<uint8_t> record) const {
   const BlockRef group = view_.table.find(key);
-  if (group == kNoBlock || record.size < sizeof(GroupRecordHead)) return 0;
+  if (group == kNoBlock || is_archived(group) || record.size < sizeof(GroupRecordHead)) return 0;
   GroupRecordHead head = {key, sizeof head, is_free(group) ? payload(group) : 0u, {}, {}, {}};
   for (int32_t i = 0; has_id(group) && i < kGroupBlocks; ++i) {
     const BlockRef block = view_.groups[group].block[i];
@@ -372,12 +378,46 @@ Status MapStorage::read_group(View<const uint8_t> record) {
   return Status::ok;
 }
 
-bool MapStorage::above_high_water() const {
-  const auto full = [&](uint32_t used, uint32_t capacity) {
-    return static_cast<float>(used) > high_water_ * static_cast<float>(capacity);
+float MapStorage::fill() const {
+  const auto share = [](uint32_t used, uint32_t capacity) {
+    return static_cast<float>(used) / static_cast<float>(std::max(capacity, 1u));
   };
-  return full(used_[0], view_.pool.free_ids.size) || full(used_[1], view_.group_pool.free_ids.size) ||
-         full(table_entries_, most_entries(view_.table.keys.size));
+  return std::max({share(used_[0], view_.pool.free_ids.size), share(used_[1], view_.group_pool.free_ids.size),
+                   share(used_[2], view_.partly_pool.free_ids.size)});
+}
+
+bool MapStorage::above_high_water() const {
+  const auto entries = static_cast<float>(most_entries(view_.table.keys.size));
+  return fill() > high_water_ || static_cast<float>(table_entries_) > high_water_ * entries;
+}
+
+uint32_t MapStorage::farthest_of_order(Vec3 centre_map, uint32_t count, View<BlockKey> keys) {
+  const auto farther = [&](const TableEntry& a, const TableEntry& b) {
+    const float da = distance2(centre_map, a.key, view_.voxel_m),
+                db = distance2(centre_map, b.key, view_.voxel_m);
+    return da != db ? da > db : a.key > b.key;
+  };
+  const uint32_t wanted = std::min(count, keys.size);
+  std::partial_sort(order_.begin(), order_.begin() + wanted, order_.begin() + count, farther);
+  for (uint32_t i = 0; i < wanted; ++i) keys[i] = order_[i].key;
+  return wanted;
+}
+
+void MapStorage::put_away(BlockKey key, uint32_t entry) {
+  BlockRef* const ref = view_.table.slot_of(key);
+  if (!ref || !has_id(*ref)) return;
+  for (const BlockRef block : view_.groups[*ref].block) remove(block);
+  view_.group_pool.give_back(*ref);
+  *ref = archived_ref(entry);
+  ++health_.archived_groups;
+}
+
+void MapStorage::forget_group(BlockKey key) {
+  BlockRef* const ref = view_.table.slot_of(key);
+  if (!ref || !is_archived(*ref)) return;
+  *ref = kNoBlock;
+  --table_entries_;
+  --health_.archived_groups;
 }
 
 /// All groups of the table, into `order_`.
@@ -401,6 +441,8 @@ void MapStorage::remove(BlockRef block) {
 }
 
 void MapStorage::give_up(const TableEntry& group) {
+  health_.archived_groups -= is_archived(group.ref);
+  health_.dropped_blocks += is_archived(group.ref);  // one at least
   if (!has_id(group.ref)) return;
   for (const BlockRef block : view_.groups[group.ref].block) {
     health_.dropped_blocks += has_id(block);
@@ -412,14 +454,18 @@ void MapStorage::give_up(const TableEntry& group) {
 void MapStorage::drop_farthest(Vec3 centre_map) {
   const auto room = [](uint32_t used, uint32_t capacity) { return used <= capacity - capacity / 10; };
   uint32_t groups = order_groups();
-  // Ties by key: the same groups go whatever their order in the table.
+  // What goes first stands last: groups with blocks, unless it is the table that is full, and of those the
+  // farthest. Ties by key: the same groups go whatever their order in the table.
+  const bool any_kind = !room(groups, most_entries(view_.table.keys.size));
   std::sort(order_.begin(), order_.begin() + groups, [&](const TableEntry& a, const TableEntry& b) {
+    if (!any_kind && has_id(a.ref) != has_id(b.ref)) return has_id(b.ref);
     const float da = distance2(centre_map, a.key, view_.voxel_m),
                 db = distance2(centre_map, b.key, view_.voxel_m);
     return da != db ? da < db : a.key < b.key;
   });
   while (groups > 0 &&
          !(room(used_[0], view_.pool.free_ids.size) && room(used_[1], view_.group_pool.free_ids.size) &&
+           room(used_[2], view_.partly_pool.free_ids.size) &&
            room(groups, most_entries(view_.table.keys.size))))
     give_up(order_[--groups]);
   rebuild_table(groups);

@@ -49,6 +49,19 @@ class MapStorage {
   uint32_t write_group(BlockKey key, View<uint8_t> record) const;
   Status read_group(View<const uint8_t> record);
 
+  /// Groups with blocks for which `keep` is false, the farthest first. @return how many
+  template <class Keep>
+  uint32_t farthest_groups(Vec3 centre_map, View<BlockKey> keys, const Keep& keep) {
+    uint32_t count = 0;
+    for (uint32_t i = 0, all = order_groups(); i < all; ++i)
+      if (has_id(order_[i].ref) && !keep(order_[i].key)) order_[count++] = order_[i];
+    return farthest_of_order(centre_map, count, keys);
+  }
+  void put_away(BlockKey key, uint32_t entry);
+  void forget_group(BlockKey key);
+
+  /// How full the fullest of the pools is, 0..1.
+  float fill() const;
   /// True when the pool of voxels, of groups or the table is fuller than map.high_water.
   bool above_high_water() const;
   /// Gives up the groups of blocks farthest from `centre_map` until a tenth of each pool is free. Counted.
@@ -68,6 +81,7 @@ class MapStorage {
   bool has_room_for(const GroupRecordHead& head) const;
   void read_block(const GroupRecordHead& head, int32_t index, const uint8_t*& from, BlockRef& ref);
   uint32_t order_groups();
+  uint32_t farthest_of_order(Vec3 centre_map, uint32_t count, View<BlockKey> keys);
   void remove(BlockRef block);
   void give_up(const TableEntry& group);
   void rebuild_table(uint32_t groups);

@@ -198,6 +198,32 @@ TEST(VisibleBlocks, WhatIsFreeForGoodIsNotListedAgain) {
   EXPECT_EQ(listed_free(false), 0);
 }
 
+TEST(VisibleBlocks, AGroupInTheArchiveIsWantedAndNothingIsListedInIt) {
+  RandomFrame frame(12);
+  const auto count = static_cast<uint32_t>(frame.pass.groups.x * frame.pass.groups.y * frame.pass.groups.z);
+  uint32_t group = 0;
+  while (group < count && best_loops().visible_group(frame.pass, group).mixed == 0) ++group;
+  ASSERT_LT(group, count);
+  frame.map.storage.insert(pack(frame.pass.block_at(group, 0)));
+  frame.map.storage.put_away(pack(frame.pass.group_at(group)), 5);
+  const GroupView view = best_loops().visible_group(frame.pass, group);
+  EXPECT_EQ(view.archived, archived_ref(5));
+  EXPECT_EQ(view.free | view.mixed | view.partly, 0u);
+}
+
+TEST(VisibleBlocks, GroupsComeIntoViewAMarginBeforeTheyAreSeen) {
+  RandomFrame frame(12);
+  const auto count = static_cast<uint32_t>(frame.pass.groups.x * frame.pass.groups.y * frame.pass.groups.z);
+  int32_t seen = 0, near = 0;
+  for (const float margin_m : {0.0f, 0.5f}) {
+    frame.pass.margin_m = margin_m;
+    for (uint32_t g = 0; g < count; ++g)
+      (margin_m > 0 ? near : seen) += frame.pass.comes_into_view(frame.pass.group_at(g));
+  }
+  EXPECT_GT(seen, 10);
+  EXPECT_GT(near, seen + seen / 10);
+}
+
 TEST(VisibleBlocks, NothingIsListedWhenNothingWasMeasured) {
   RandomFrame frame(5);
   const TestImage<float> nothing(kRows, kCols);

@@ -212,6 +212,54 @@ TEST(MapStorage, StaysConsistentOverManyDrops) {
   EXPECT_GT(map.health().dropped_blocks, 100u);
 }
 
+// --- the archive's side ---
+
+TEST(MapStorage, AGroupPutAwayIsUnknownAndItsBlocksCanBeHadAgain) {
+  Storage storage(params_of(100));
+  MapStorage& map = storage.map;
+  for (int32_t i = 0; i < 5; ++i) map.insert(pack({i, 0, 0}));  // two groups
+  map.put_away(pack({0, 0, 0}), 77);
+  EXPECT_EQ(map.health().blocks, 1u);
+  EXPECT_EQ(map.health().archived_groups, 1u);
+  EXPECT_EQ(map.view().table.find(pack({0, 0, 0})), archived_ref(77));
+  EXPECT_EQ(map.view().ref_of({1, 0, 0}), kNoBlock);
+  EXPECT_FALSE(map.view().read({1, 0, 0}));
+  std::vector<BlockKey> keys(10);
+  EXPECT_EQ(map.list_groups({keys.data(), 10}), 1u);
+  EXPECT_EQ(keys[0], pack({1, 0, 0}));
+  EXPECT_FALSE(map.see_group_free({0, 0, 0}));
+  map.forget_group(pack({0, 0, 0}));
+  EXPECT_EQ(map.health().archived_groups, 0u);
+  EXPECT_EQ(map.insert(pack({1, 0, 0})).answer, Insert::inserted);
+}
+
+TEST(MapStorage, AGroupThatComesBackIsAsItWas) {
+  Storage storage(params_of(100));
+  MapStorage& map = storage.map;
+  const BlockId id = map.insert(pack({2, 1, 0})).block;
+  map.view().blocks[id].surface[9].sdf = 1234;
+  std::vector<uint8_t> record(kMaxGroupRecordBytes);
+  const uint32_t bytes = map.write_group(pack({0, 0, 0}), {record.data(), kMaxGroupRecordBytes});
+  map.put_away(pack({0, 0, 0}), 3);
+  EXPECT_EQ(map.health().blocks, 0u);
+  ASSERT_EQ(map.read_group({record.data(), bytes}), Status::ok);
+  EXPECT_EQ(map.health().blocks, 1u);
+  EXPECT_EQ(map.health().archived_groups, 0u);
+  EXPECT_EQ(map.view().blocks[map.view().voxels_of({2, 1, 0})].surface[9].sdf, 1234);
+}
+
+TEST(MapStorage, TheFarthestGroupsComeFirstAndThoseToKeepNotAtAll) {
+  Storage storage(params_of(100));
+  MapStorage& map = storage.map;
+  for (int32_t i = 0; i < 10; ++i) map.insert(pack({4 * i, 0, 0}));
+  const auto keep_odd = [](BlockKey group) { return unpack(group).x % 2 != 0; };
+  std::vector<BlockKey> keys(3);
+  ASSERT_EQ(map.farthest_groups({}, {keys.data(), 3}, keep_odd), 3u);
+  EXPECT_EQ(keys, (std::vector<BlockKey>{pack({8, 0, 0}), pack({6, 0, 0}), pack({4, 0, 0})}));
+  keys.resize(100);
+  EXPECT_EQ(map.farthest_groups({}, {keys.data(), 100}, keep_odd), 5u);
+}
+
 // --- free space without voxels ---
 
 MapParams hierarchical(int32_t pool_blocks) {
