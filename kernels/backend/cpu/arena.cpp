@@ -5,6 +5,8 @@
 #include <unistd.h>
 
 #include <cassert>
+#include <cstdio>
+#include <cstdlib>
 
 namespace stillmap {
 
@@ -13,7 +15,12 @@ Arena::Arena(uint64_t bytes) : size_(bytes) {
 }
 
 Arena::Arena(uint64_t bytes, const char* dir) : size_(bytes) {
-  const int file = open(dir, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
+  // Not O_TMPFILE: not every file system has it.
+  char name[1024];
+  const int letters = std::snprintf(name, sizeof name, "%s/map-XXXXXX", dir);
+  const bool fits = letters > 0 && static_cast<size_t>(letters) < sizeof name;
+  const int file = fits ? mkostemp(name, O_CLOEXEC) : -1;
+  if (file >= 0) unlink(name);
   failed_ = file < 0 || ftruncate(file, static_cast<off_t>(bytes)) != 0;
   if (!failed_) map_memory(MAP_SHARED, file);
   if (file >= 0) close(file);
