@@ -32,7 +32,8 @@ inline void keep_nearest(const Row& row, const Mat3& direction, int32_t index, c
   for (int32_t i = 0; i < row.count; ++i) {
     const float x = row.x[i];
     const float t = entry(direction.m[0] * x + cx, direction.m[3] * x + cy, direction.m[6] * x + cz);
-    const bool nearer = t < row.depth[i];
+    // Of two at the same depth the first of the world wins, in whatever order they are asked.
+    const bool nearer = t < row.depth[i] || (t == row.depth[i] && index < row.index[i]);
     row.depth[i] = nearer ? t : row.depth[i];
     row.index[i] = nearer ? index : row.index[i];
   }
@@ -123,13 +124,27 @@ Spot spot_of(const Shape& shape, Vec3 p) {
   return {};
 }
 
-/// Share of the light that comes back, about 0.35..1.1.
-float light(Vec3 p, Vec3 normal) {
-  const Vec3 to_lamp = kLamp - p;
+/// What a lamp in direction `to_lamp` adds.
+float lamp_light(Vec3 to_lamp, Vec3 normal) {
   const float distance2 = dot(to_lamp, to_lamp);
   const float lamp = larger(dot(normal, to_lamp), 0.0f) / std::sqrt(distance2 + 1e-4f);
+  return 0.7f * lamp / (1.0f + 0.1f * distance2);
+}
+
+/// Of a row of lamps those two count between which `p` is: the others are far.
+float row_light(Vec3 to_lamp, Vec3 normal, float spacing_m) {
+  const float behind_m = to_lamp.x - spacing_m * std::ceil(to_lamp.x / spacing_m);  // -spacing .. 0
+  return lamp_light({behind_m, to_lamp.y, to_lamp.z}, normal) +
+         lamp_light({behind_m + spacing_m, to_lamp.y, to_lamp.z}, normal);
+}
+
+/// Share of the light that comes back, about 0.35..1.1.
+float light(Vec3 p, Vec3 normal, float lamp_spacing_m) {
+  const Vec3 to_lamp = kLamp - p;
+  const float lamps =
+      lamp_spacing_m > 0.0f ? row_light(to_lamp, normal, lamp_spacing_m) : lamp_light(to_lamp, normal);
   const float window = larger(dot(normal, kWindowDirection), 0.0f);
-  return 0.45f + 0.7f * lamp / (1.0f + 0.1f * distance2) + 0.16f * window + 0.05f * normal.z;
+  return 0.45f + lamps + 0.16f * window + 0.05f * normal.z;
 }
 
 }  // namespace
@@ -175,6 +190,7 @@ void Renderer::render(const World& world, const Se3d& T_world_cam, ThreadPool& w
     cast_.push_back(cast_shape(shape, T_world_cam));
     find_tiles(shape, T_cam_world, cast_.back());
   }
+  find_order();
   workers.for_each(static_cast<uint32_t>(tile_cols_ * tile_rows_), [&](uint32_t tile) {
     render_tile(world, T_world_cam, static_cast<int32_t>(tile), images);
   });
@@ -244,6 +260,17 @@ void Renderer::find_tiles(const Shape& shape, const Se3& T_cam_world, CastShape&
   cast.last_tile_row = std::min(tile_of(bottom + 1.0f, tile_rows_), tile_rows_ - 1);
 }
 
+void Renderer::find_order() {
+  // The near ones first: they hide the others. The room is everywhere, so that it bounds what follows.
+  nearest_first_.clear();
+  for (size_t i = 0; i < cast_.size(); ++i)
+    if (cast_[i].last_tile_col >= 0) nearest_first_.push_back(static_cast<int32_t>(i));
+  std::sort(nearest_first_.begin(), nearest_first_.end(), [&](int32_t a, int32_t b) {
+    const float a_m = cast_[static_cast<size_t>(a)].nearest_m, b_m = cast_[static_cast<size_t>(b)].nearest_m;
+    return a_m < b_m || (a_m == b_m && a < b);
+  });
+}
+
 void Renderer::render_tile(const World& world, const Se3d& T_world_cam, int32_t tile,
                            IdealImages& images) const {
   const int32_t tile_row = tile / tile_cols_, tile_col = tile % tile_cols_;
@@ -259,12 +286,13 @@ void Renderer::render_tile(const World& world, const Se3d& T_world_cam, int32_t 
   std::fill(std::begin(hits.depth), std::end(hits.depth), kMiss);
   std::fill(std::begin(hits.index), std::end(hits.index), 0);
   float farthest_m = kMiss;
-  for (size_t i = 0; i < cast_.size(); ++i) {
-    const CastShape& c = cast_[i];
+  for (const int32_t i : nearest_first_) {
+    const CastShape& c = cast_[static_cast<size_t>(i)];
+    if (c.nearest_m > farthest_m) break;
     if (tile_col < c.first_tile_col || tile_col > c.last_tile_col || tile_row < c.first_tile_row ||
-        tile_row > c.last_tile_row || c.nearest_m > farthest_m)
+        tile_row > c.last_tile_row)
       continue;
-    intersect(c, static_cast<int32_t>(i), hits);
+    intersect(c, i, hits);
     farthest_m = hits.farthest_m();
   }
   shade(world, cast<float>(T_world_cam).translation, hits, images);
@@ -320,7 +348,8 @@ void Renderer::shade(const World& world, Vec3 camera_world, const Hits& hits, Id
       const Vec3 to_camera = camera_world - p;
       const float cos_incidence = std::abs(dot(normal, to_camera)) / norm(to_camera);
       const float footprint_m = depth / k_.fx / larger(cos_incidence, 0.15f);
-      const Vec3 colour = light(p, normal) * surface_colour(*material, noise_, spot.s, spot.t, footprint_m);
+      const Vec3 colour = light(p, normal, world.lamp_spacing_m) *
+                          surface_colour(*material, noise_, spot.s, spot.t, footprint_m);
 
       const size_t i = line + static_cast<size_t>(c);
       images.depth_m[i] = depth;

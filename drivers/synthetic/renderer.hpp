@@ -30,7 +30,8 @@ inline uint8_t to_byte(float v) {
 /// What a camera sees with a hand on its lens: dark, nearer than it can measure, all of it moving.
 void cover_lens(IdealImages& images);
 
-/// Ray caster: tiles, each with the shapes whose outline touches it and that are not behind all of its hits.
+/// Ray caster: tiles, each with the shapes whose outline touches it and that are not behind all of its hits;
+/// the nearest are asked first.
 /// @thread one caller at a time
 class Renderer {
  public:
@@ -56,6 +57,7 @@ class Renderer {
 
   CastShape cast_shape(const Shape& shape, const Se3d& T_world_cam) const;
   void find_tiles(const Shape& shape, const Se3& T_cam_world, CastShape& cast) const;
+  void find_order();
   void render_tile(const World& world, const Se3d& T_world_cam, int32_t tile, IdealImages& images) const;
   void intersect(const CastShape& cast, int32_t index, Hits& hits) const;
   void shade(const World& world, Vec3 camera_world, const Hits& hits, IdealImages& images) const;
@@ -63,6 +65,7 @@ class Renderer {
   Intrinsics k_;
   int32_t tile_cols_, tile_rows_;
   std::vector<CastShape> cast_;
+  std::vector<int32_t> nearest_first_;  ///< those in view, by `nearest_m`
   ValueNoise noise_;
 };
 

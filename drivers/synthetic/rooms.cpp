@@ -1,4 +1,5 @@
 #include "drivers/synthetic/builders.hpp"
+#include "drivers/synthetic/materials.hpp"
 
 namespace stillmap::synthetic {
 
@@ -15,16 +16,8 @@ void add_walls(World& world, const Material& walls, const Material& floor, const
   add(world, {Kind::room, false, kRoomHalfM, {Mat3{}, {0, 0, kRoomHalfM.z}}, walls});
 }
 
-Material wood(uint32_t variant) {
-  return {Pattern::planks, {96, 62, 38}, {176, 128, 84}, 0.12f, variant};
-}
-
 Material cloth(Vec3 a, Vec3 b, float scale_m, uint32_t variant) {
   return {Pattern::cloud, a, b, scale_m, variant};
-}
-
-Material print(Vec3 ground, float tile_m, uint32_t variant) {
-  return {Pattern::poster, ground, {235, 230, 210}, tile_m, variant};
 }
 
 void bookshelf(World& world) {  // east wall, south half
@@ -190,13 +183,6 @@ void inner_wall(World& world, float x0, float y0, float x1, float y1, const Mate
   const float thick_x = x0 == x1 ? kWallHalfM : 0.0f, thick_y = y0 == y1 ? kWallHalfM : 0.0f;
   add(world, make_block({x0 - thick_x, y0 - thick_y, from_z},
                         {x1 + thick_x, y1 + thick_y, 2.0f * kSuiteHalfM.z}, material));
-}
-
-Material wallpaper(uint32_t variant) {
-  const Vec3 tints[4] = {{206, 190, 160}, {170, 190, 176}, {176, 182, 206}, {204, 176, 170}};
-  const Vec3 ground = tints[variant % 4];
-  return {Pattern::wallpaper, ground, 0.78f * ground, 0.13f + 0.02f * static_cast<float>(variant % 3),
-          variant};
 }
 
 /// Walls across the suite, each with a door to the south and one to the north, and the one along it.

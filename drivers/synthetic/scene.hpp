@@ -50,6 +50,7 @@ struct RoomMaterials {
 struct World {
   std::vector<Shape> shapes;
   RoomMaterials room;
+  float lamp_spacing_m = 0;  ///< the lamp is there again and again along x; 0: only once
 };
 
 /// Distance from `p_world` to the surface, metres, negative inside the solid (for the room: outside of its

@@ -117,6 +117,33 @@ Se3d long_loop_camera(double t) {
                   kDegree * (-6.0 + 4.0 * wave(walked_s, kRound_s / 9.0)), t);
 }
 
+// ---- corridor
+
+constexpr double kCorridorPace_m_per_s = 1.1;
+constexpr double kOneWay_s = 56.0;  // of walking, besides a second at each end to set off and to stop
+constexpr double kSetOff_s = 2.0;
+constexpr double kTurning_s = 10.0;  // at most 34 degrees a second
+constexpr double kSetOffBack_s = kOneWay_s + kTurning_s + 0.5;
+
+/// Seconds of an even walk that begins at `from_s` and ends where `kOneWay_s` of it lead.
+double walked_s(double from_s, double t) {
+  const double since_s = std::max(0.0, t - from_s);
+  return from_rest(since_s, kSetOff_s) - from_rest(std::max(0.0, since_s - kOneWay_s), kSetOff_s);
+}
+
+/// To the far end, about, back, and about again: the end is the start.
+Se3d corridor_camera(double t) {
+  const double there_s = walked_s(0.0, t), back_s = walked_s(kSetOffBack_s, t), both_s = there_s + back_s;
+  const double about_s = kOneWay_s + 1.0, about_again_s = kSetOffBack_s + about_s;
+  const double turns =
+      0.5 * (rise(about_s, about_s + kTurning_s, t) + rise(about_again_s, about_again_s + kTurning_s, t));
+  const double x = kCorridorPace_m_per_s * (there_s - back_s - 0.5 * kOneWay_s);
+  const double y = 0.18 * wave(both_s, kOneWay_s / 9.0) + 0.05 * wave(both_s, kOneWay_s / 13.0);
+  const double yaw = kTurn * turns + 7.0 * kDegree * wave(both_s, kOneWay_s / 10.0);
+  const double pitch = kDegree * (-12.5 + 2.0 * wave(both_s, kOneWay_s / 12.0));
+  return handheld({x, y, 1.16 + 0.02 * wave(both_s, kOneWay_s / 22.0)}, yaw, pitch, t);
+}
+
 // ---- balloon
 
 constexpr float kBalloonM = 0.30f;
@@ -579,7 +606,8 @@ const std::vector<Scene>& all_scenes() {
       {"fast", 10, false, furnished_room, no_movers, fast_camera},
       {"covered", 16, false, furnished_room, no_movers, looking_about_camera, hand_on_lens},
       {"camera_kidnapped", 14, false, furnished_room, no_movers, kidnapped_camera, carried_off},
-      {"long_loop", 57, false, suite_of_rooms, no_movers, long_loop_camera}};
+      {"long_loop", 57, false, suite_of_rooms, no_movers, long_loop_camera},
+      {"corridor", 136, false, corridor, no_movers, corridor_camera}};
   return scenes;
 }
 

@@ -147,5 +147,46 @@ TEST(Renderer, textured_room_has_texture_and_bare_room_has_hardly_any) {
   EXPECT_LT(contrast(bare_room), 2.0);
 }
 
+TEST(Renderer, the_order_of_the_shapes_does_not_change_the_picture) {
+  World world, reversed;
+  furnished_room(world);
+  reversed = world;
+  std::reverse(reversed.shapes.begin() + 1, reversed.shapes.end());
+  const Se3d T_world_cam = look({-1.2, 0.3, 1.3}, 0.3, -0.2, 0.05);
+  EXPECT_EQ(picture(world, T_world_cam).depth_m, picture(reversed, T_world_cam).depth_m);
+}
+
+TEST(Renderer, of_two_surfaces_at_the_same_place_the_first_of_the_world_is_seen) {
+  // Seen at an angle the wide block begins nearer than the small one, whose front is in the same plane.
+  const Shape small = make_block({1.0f, -0.3f, 1.0f}, {1.5f, 0.3f, 1.6f}, {Pattern::plain, {200, 0, 0}});
+  const Shape wide = make_block({1.0f, -0.9f, 0.8f}, {1.5f, 0.9f, 1.8f}, {Pattern::plain, {0, 200, 0}});
+  for (const bool small_first : {true, false}) {
+    World world = empty_room();
+    world.shapes.push_back(small_first ? small : wide);
+    world.shapes.push_back(small_first ? wide : small);
+    const Rgb8 seen = picture(world, look({-1, 0, 1.3}, 0, 0, 0)).colour[59 * 160 + 79];
+    EXPECT_EQ(seen.r > seen.g, small_first);
+    const Rgb8 aside = picture(world, look({-0.6, 1.2, 1.3}, -0.6435, 0, 0)).colour[59 * 160 + 79];
+    EXPECT_EQ(aside.r > aside.g, small_first);
+  }
+}
+
+TEST(Renderer, a_row_of_lamps_lights_every_stretch_alike) {
+  World world;
+  world.shapes.push_back({Kind::room, false, {30.0f, 1.5f, 1.3f}, {Mat3{}, {0, 0, 1.3f}}, {}});
+  const auto mean_red = [&](double x) {
+    const IdealImages images = picture(world, look({x, 0, 1.3}, 1.5708, -0.4, 0));
+    double sum = 0;
+    for (const Rgb8 c : images.colour) sum += c.r;
+    return sum / static_cast<double>(images.colour.size());
+  };
+  const double under_the_lamp = mean_red(0.2), far_from_it = mean_red(0.2 + 4 * 5.5);
+  EXPECT_LT(far_from_it, 0.8 * under_the_lamp);
+  world.lamp_spacing_m = 5.5f;
+  EXPECT_GT(mean_red(0.2), under_the_lamp - 0.01);  // another one adds a little
+  EXPECT_NEAR(mean_red(0.2 + 4 * 5.5), mean_red(0.2), 0.5);
+  EXPECT_NEAR(mean_red(0.2 - 2 * 5.5), mean_red(0.2), 0.5);
+}
+
 }  // namespace
 }  // namespace stillmap::synthetic

@@ -216,6 +216,76 @@ TEST(Scenes, long_loop_walks_40_metres_and_sees_its_start_again) {
   EXPECT_LT(degrees_between(start, end), 3.0);
 }
 
+TEST(Scenes, corridor_is_walked_there_and_back_and_turned_in_slowly) {
+  const Scene& scene = scene_named("corridor");
+  const Pace pace = pace_of(scene);
+  double path_m = 0, farthest_m = 0, fastest_turn_deg = 0;
+  const Se3d start = scene.camera(0), end = scene.camera(scene.default_seconds);
+  for (double t = 0; t < scene.default_seconds; t += kFrame_s) {
+    const Se3d here = scene.camera(t), next = scene.camera(t + kFrame_s);
+    path_m += norm(next.translation - here.translation);
+    farthest_m = std::max(farthest_m, norm(here.translation - start.translation));
+    fastest_turn_deg = std::max(fastest_turn_deg, degrees_between(here, next));
+  }
+  EXPECT_GT(farthest_m, 60.0);
+  EXPECT_GT(path_m, 2 * farthest_m);
+  EXPECT_LT(path_m, 130.0);
+  EXPECT_GT(pace.m_per_s, 0.8);  // with the time for turning
+  EXPECT_LT(fastest_turn_deg, 1.5);
+  EXPECT_LT(norm(end.translation - start.translation), 0.03);
+  EXPECT_LT(degrees_between(start, end), 3.0);
+}
+
+TEST(Scenes, corridor_is_60_m_long_and_its_lens_keeps_30_cm_clear) {
+  const Scene& scene = scene_named("corridor");
+  const World world = world_at(scene, 0, false);
+  EXPECT_GE(world.shapes[0].half_m.x, 30.0f);
+  for (double t = 0; t < scene.default_seconds; t += 0.1) {
+    const Vec3 lens = cast<float>(scene.camera(t)).translation;
+    for (const Shape& shape : world.shapes) ASSERT_GE(distance_m(shape, lens), 0.3f) << "at " << t << " s";
+  }
+}
+
+/// What of a view can be measured, and what of that stops a camera from sliding along x.
+struct Grip {
+  double measured = 0;  ///< of the rays
+  double across = 0;    ///< of the measured: 2 cm along x lead off that surface
+};
+
+Grip grip_of(const IdealImages& images, const World& world, const Se3d& T_world_cam) {
+  constexpr int32_t kStep = 3;
+  const Se3 T = cast<float>(T_world_cam);
+  int rays = 0, measured = 0, across = 0;
+  for (int32_t row = 0; row < kCamera.height; row += kStep)
+    for (int32_t col = 0; col < kCamera.width; col += kStep) {
+      ++rays;
+      const auto i = static_cast<size_t>(row * kCamera.width + col);
+      const float depth_m = images.depth_m[i];
+      if (depth_m < kDepthMinM || depth_m > kDepthMaxM || images.cos_incidence[i] < 0.2f) continue;
+      ++measured;
+      const Vec3 p = T * unproject(kCamera, static_cast<float>(col), static_cast<float>(row), depth_m);
+      float off_m = 1e9f;
+      for (const Shape& shape : world.shapes)
+        off_m = std::min(off_m, std::abs(distance_m(shape, p + Vec3{0.02f, 0, 0})));
+      across += off_m > 0.01f ? 1 : 0;
+    }
+  return {static_cast<double>(measured) / rays, static_cast<double>(across) / std::max(measured, 1)};
+}
+
+TEST(Scenes, corridor_never_shows_bare_walls_only) {
+  const Scene& scene = scene_named("corridor");
+  const World world = world_at(scene, 0, false);
+  ThreadPool workers(1);
+  Renderer renderer(kCamera);
+  IdealImages images;
+  for (double t = 0; t < scene.default_seconds; t += 1.0) {
+    renderer.render(world, scene.camera(t), workers, images);
+    const Grip grip = grip_of(images, world, scene.camera(t));
+    EXPECT_GT(grip.measured, 0.65) << "at " << t << " s";
+    EXPECT_GT(grip.across, 0.05) << "at " << t << " s";
+  }
+}
+
 TEST(Scenes, obstructing_box_fills_80_percent_for_two_seconds) {
   double filled_s = 0, longest_s = 0;
   for (const Shares& s : shares_over(scene_named("obstructing_box"), 0.1)) {
