@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "drivers/synthetic/builders.hpp"
 
@@ -91,6 +92,33 @@ std::vector<const Shape*> near_to(const World& world, size_t own) {
   return near;
 }
 
+/// Of many shapes those that reach the metre of space in which one asks; points of a face come row by row, so
+/// that one asks the same metre again and again.
+class NearPoint {
+ public:
+  explicit NearPoint(std::vector<const Shape*> all) : all_(std::move(all)) {}
+
+  const std::vector<const Shape*>& at(Vec3 p_world) {
+    const Vec3 middle = {std::floor(p_world.x) + 0.5f, std::floor(p_world.y) + 0.5f,
+                         std::floor(p_world.z) + 0.5f};
+    if (found_ && norm(middle - middle_) < 0.5f) return near_;
+    constexpr float kHalfDiagonalM = 0.8661f;
+    near_.clear();
+    for (const Shape* shape : all_)
+      if (shape->kind == Kind::room ||
+          norm(shape->T_world_local.translation - middle) < reach_m(*shape) + kHalfDiagonalM)
+        near_.push_back(shape);
+    middle_ = middle;
+    found_ = true;
+    return near_;
+  }
+
+ private:
+  std::vector<const Shape*> all_, near_;
+  Vec3 middle_;
+  bool found_ = false;
+};
+
 bool hidden(const std::vector<const Shape*>& others, Vec3 p_world) {
   for (const Shape* other : others) {
     const Vec3 from_centre = p_world - other->T_world_local.translation;
@@ -108,10 +136,10 @@ std::vector<Vec3> sample_still_surface(const World& world, float step_m) {
   for (size_t i = 0; i < world.shapes.size(); ++i) {
     const Shape& shape = world.shapes[i];
     if (shape.moving) continue;
-    const std::vector<const Shape*> others = near_to(world, i);
+    NearPoint others(near_to(world, i));
     sample_shape(shape, step_m, [&](Vec3 p_local) {
       const Vec3 p = shape.T_world_local * p_local;
-      if (!hidden(others, p)) points.push_back(p);
+      if (!hidden(others.at(p), p)) points.push_back(p);
     });
   }
   return points;
