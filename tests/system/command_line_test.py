@@ -131,7 +131,7 @@ class Usage(Case):
                           ["run", "--source", SMALL, "--set", "record.map=true"],
                           ["run", "--source", "xtion"],
                           ["mesh", "a.smap", "--out", "b.ply"], ["replay", "a.lcm"], ["top"], ["doctor"],
-                          ["bench", "scale"], ["bench", "soak"]]:
+                          ["bench", "soak"]]:
             done = self.refused(2, *arguments)
             self.assertIn("build", done.stderr, arguments)
 
@@ -428,6 +428,40 @@ class Bench(Case):
         report = json.loads(done.stdout)
         self.assertEqual(report["frames"], 10)
         self.assertGreater(report["ms"]["total"]["p50"], 0)
+
+    def test_scale(self):
+        done = stillmap("bench", "scale", "--source", "synthetic:crowd,size=160x120,seconds=1", "--frames", "8", "--json",
+                        *LITTLE, "--set", "map.free_space=hierarchical")
+        self.assertIn(done.returncode, [0, 1], done.stderr)  # 1: this machine was too busy for the bar
+        maps = json.loads(done.stdout)["maps"]
+        self.assertEqual([m["copies"] for m in maps], [1, 10, 50])
+        self.assertGreater(maps[0]["blocks"], 100)
+        self.assertEqual([m["blocks"] for m in maps], [n * maps[0]["blocks"] for n in (1, 10, 50)])
+
+    def test_free_space(self):
+        done = stillmap("bench", "free_space", "--source", "crowd", "--seconds", "2", "--json", *LITTLE)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        [row] = json.loads(done.stdout)
+        self.assertGreater(row["equal"], 0.999 * row["points"])
+        for known in ["unknown", "free", "occupied"]:
+            self.assertGreater(row[known], 0.02 * row["points"], known)
+        self.assertLess(row["hierarchical_bytes"], 0.9 * row["dense_bytes"])
+
+    def test_archive(self):
+        """A map that does not fit leaves the mesh of one that does."""
+        meshes = []
+        for name, more in [("whole", []), ("archived", ["--set", "map.pool_blocks=1300", "--set",
+                                                        f"archive.dir={self.folder}/archive"])]:
+            out = self.folder / name
+            done = stillmap("run", "--source", "synthetic:loop,size=160x120", "--quiet", *LITTLE, "--set",
+                            "map.free_space=hierarchical", "--set", "record.snapshots=0", "--out", out, *more)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            report = json.loads((out / "report.json").read_text())
+            self.assertEqual((report["heap_allocations_in_loop"], report["faults"]), (0, {}))
+            meshes.append((out / "mesh.ply").stat().st_size)
+        self.assertGreater(report["map"]["archived"], 10)
+        self.assertLess(abs(meshes[0] - meshes[1]), 0.01 * meshes[0])
+        self.assertEqual(list((self.folder / "archive").iterdir()), [])
 
     def test_accuracy(self):
         done = stillmap("bench", "accuracy", "--source", "synthetic:static,size=160x120,seconds=1", "--json", *LITTLE,
