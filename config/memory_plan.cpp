@@ -10,24 +10,24 @@ namespace {
 
 constexpr uint64_t kBytesPerMb = 1000000;
 
-void add(MemoryPlan& plan, std::string name, uint64_t bytes) {
-  plan.pools.push_back({std::move(name), bytes});
-  plan.total_bytes += bytes;
-}
-
 double megabytes(uint64_t bytes) {
   return static_cast<double>(bytes) / static_cast<double>(kBytesPerMb);
 }
 
 }  // namespace
 
+void MemoryPlan::add(std::string name, uint64_t bytes) {
+  pools.push_back({std::move(name), bytes});
+  total_bytes += bytes;
+}
+
 MemoryPlan memory_plan(const Config& config, const CameraModel& camera, const MemoryItems& engine) {
   MemoryPlan plan;
-  for (uint32_t i = 0; i < engine.count; ++i) add(plan, engine.item[i].name, engine.item[i].bytes);
+  for (uint32_t i = 0; i < engine.count; ++i) plan.add(engine.item[i].name, engine.item[i].bytes);
   const uint64_t pixels = static_cast<uint64_t>(camera.k.width) * static_cast<uint64_t>(camera.k.height);
-  add(plan, "frame slots: depth", kFrameSlots * pixels * sizeof(uint16_t));
-  add(plan, "frame slots: colour", kFrameSlots * pixels * sizeof(Rgb8));
-  add(plan, "frame slots: true mask", kFrameSlots * pixels * sizeof(uint8_t));
+  plan.add("frame slots: depth", kFrameSlots * pixels * sizeof(uint16_t));
+  plan.add("frame slots: colour", kFrameSlots * pixels * sizeof(Rgb8));
+  plan.add("frame slots: true mask", kFrameSlots * pixels * sizeof(uint8_t));
   plan.budget_bytes = static_cast<uint64_t>(config.memory.budget_mb) * kBytesPerMb;
   return plan;
 }

@@ -21,6 +21,7 @@ struct MemoryPlan {
   uint64_t total_bytes = 0;
   uint64_t budget_bytes = 0;
 
+  void add(std::string name, uint64_t bytes);
   bool fits() const { return total_bytes <= budget_bytes; }
 };
 

@@ -44,7 +44,7 @@ struct Agreement {
   bool reached() const { return points > 0 && share() > kLeastAgreement && over_surface() <= kMostBytes; }
 };
 
-/// Points between the planes z of a group and its upper end, over the x and y of the whole map.
+/// Asks both maps for the points of a grid in every group that the dense one has.
 void compare_groups(const Engine& dense, const Engine& lean, float voxel_m, Agreement& out) {
   std::vector<uint64_t> keys(dense.list_groups({}));
   dense.list_groups({keys.data(), static_cast<uint32_t>(keys.size())});

@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 #include <cstdio>
+#include <cstring>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -45,24 +45,19 @@ class Pieces {
   /// Puts a copy into a map, so many groups aside. @return false when there is no room
   bool copy_into(Engine& map, int32_t groups_aside) {
     for (std::vector<uint8_t>& piece : pieces_) {
-      const uint64_t key = set_key(piece, 0, groups_aside);
+      GroupRecordHead head;
+      std::memcpy(&head, piece.data(), sizeof head);
+      GroupRecordHead aside = head;
+      aside.group = pack(unpack(head.group) + Int3{groups_aside, 0, 0});
+      std::memcpy(piece.data(), &aside, sizeof aside);
       const Status status = map.read_group({piece.data(), static_cast<uint32_t>(piece.size())});
-      set_key(piece, key, 0);
+      std::memcpy(piece.data(), &head, sizeof head);
       if (status != Status::ok) return false;
     }
     return true;
   }
 
  private:
-  /// @param key 0: the one that stands there, moved aside. @return the one that stood there
-  static uint64_t set_key(std::vector<uint8_t>& piece, uint64_t key, int32_t aside) {
-    uint64_t old = 0;
-    std::copy_n(piece.data(), sizeof old, reinterpret_cast<uint8_t*>(&old));
-    if (key == 0) key = pack(unpack(old) + Int3{aside, 0, 0});
-    std::copy_n(reinterpret_cast<const uint8_t*>(&key), sizeof key, piece.data());
-    return old;
-  }
-
   std::vector<std::vector<uint8_t>> pieces_;
 };
 

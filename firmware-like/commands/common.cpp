@@ -69,6 +69,28 @@ FrameSlot::FrameSlot(const SourceInfo& info) {
   frame_.truth_mask = {truth_mask_.data(), rows, cols, cols};
 }
 
+namespace {
+
+/// Of map.high_water: between them there is room for what comes while the archive writes.
+constexpr float kArchiveBelow = 0.9f;
+
+}  // namespace
+
+BlockArchive::Options archive_options(const Config& config) {
+  BlockArchive::Options options;
+  options.dir = config.archive.dir;
+  options.max_bytes = static_cast<uint64_t>(config.archive.max_bytes);
+  options.keep_below = kArchiveBelow * config.map.high_water;
+  return options;
+}
+
+MemoryPlan plan_memory(const Config& config, const EngineParams& params) {
+  MemoryPlan plan = memory_plan(config, params.camera, params.depth_units_per_m);
+  if (!config.archive.dir.empty())
+    plan.add("archive: groups on their way", BlockArchive::planned_bytes(archive_options(config)));
+  return plan;
+}
+
 FrameSlots preload(FrameSource& source, int32_t count) {
   FrameSlots slots;
   while (static_cast<int32_t>(slots.size()) < count && !stop_requested()) {

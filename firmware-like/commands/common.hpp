@@ -8,8 +8,10 @@
 #include <vector>
 
 #include "config/config.hpp"
+#include "config/memory_plan.hpp"
 #include "config/result.hpp"
 #include "drivers/registry.hpp"
+#include "runtime/archive/block_archive.hpp"
 #include "runtime/ports/frame_source.hpp"
 
 namespace stillmap {
@@ -20,6 +22,12 @@ Result<Config> read_config(const std::string& path, const std::vector<std::strin
 
 /// @return an error of kind bad_usage that lists every violation, one a line
 Result<Done> check(const Config& config);
+
+/// Where far parts of the map go, as the configuration says.
+BlockArchive::Options archive_options(const Config& config);
+
+/// All memory of a run: the engine, the frames, the archive where there is one.
+MemoryPlan plan_memory(const Config& config, const EngineParams& params);
 
 /// What a source has to be told: the camera and the stamps where the configuration overrides them.
 SourceOptions source_options(const Config& config);

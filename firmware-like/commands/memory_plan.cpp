@@ -26,7 +26,7 @@ int show(const MemoryPlanOptions& o) {
   CameraModel camera;
   camera.k = {525, 525, 319.5f, 239.5f, kWidth, kHeight};
   const EngineParams params = engine_params(*config, camera, 5000);
-  const MemoryPlan plan = memory_plan(*config, params.camera, params.depth_units_per_m);
+  const MemoryPlan plan = plan_memory(*config, params);
   std::printf("for images of %dx%d pixels\n%s", kWidth, kHeight, table(plan).c_str());
   if (plan.fits()) return kExitDone;
   return fail("the plan is over memory.budget_mb; raise it or lower map.pool_blocks", ErrorKind::bad_usage);

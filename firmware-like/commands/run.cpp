@@ -25,9 +25,6 @@
 namespace stillmap {
 namespace {
 
-/// Of map.high_water: between them there is room for what comes while the archive writes.
-constexpr float kArchiveBelow = 0.9f;
-
 /// Opens the source, waiting source.wait_s for it to appear.
 Result<std::unique_ptr<FrameSource>> open_waiting(const std::string& name, const Config& config) {
   using Clock = std::chrono::steady_clock;
@@ -48,14 +45,6 @@ int64_t expected_frames(const SourceInfo& info, const RunOptions& o) {
   if (info.frames < 0) return o.max_frames > 0 ? o.max_frames : -1;
   const int64_t left = std::max<int64_t>(info.frames - o.skip_frames, 0);
   return o.max_frames > 0 ? std::min<int64_t>(left, o.max_frames) : left;
-}
-
-BlockArchive::Options archive_options(const Config& config) {
-  BlockArchive::Options options;
-  options.dir = config.archive.dir;
-  options.max_bytes = static_cast<uint64_t>(config.archive.max_bytes);
-  options.keep_below = kArchiveBelow * config.map.high_water;
-  return options;
 }
 
 void print_summary(const RunOptions& o, const RunOutputs& outputs, const PipelineCounters& counters,
@@ -101,7 +90,7 @@ int run(const RunOptions& o, FrameObserver* observer) {
   source.skip(o.skip_frames);
 
   const EngineParams params = engine_params(config, source.info().camera, source.info().depth_units_per_m);
-  const MemoryPlan memory = memory_plan(config, params.camera, params.depth_units_per_m);
+  const MemoryPlan memory = plan_memory(config, params);
   if (const auto fits = check_budget(memory); !fits) return fail(fits.error(), fits.error_kind());
   const std::unique_ptr<Engine> engine = make_cpu_engine(params);
   if (!engine)

@@ -28,46 +28,29 @@ struct HashView {
   View<BlockKey> keys;   ///< capacity a power of two; kEmptyKey: free slot
   View<BlockId> blocks;  ///< kNoBlock: key without a block; kPending: being inserted
 
-  /// Adds a key that is not there, with its block. False: no slot within kMaxProbes.  @thread one
-  STILLMAP_HD bool put(BlockKey key, BlockId block) const {
-    const uint32_t mask = keys.size - 1;
-    uint32_t slot = static_cast<uint32_t>(hash_of(key)) & mask;
-    for (uint32_t probe = 0; probe < kMaxProbes; ++probe, slot = (slot + 1) & mask) {
-      if (keys[slot] != kEmptyKey) continue;
-      keys[slot] = key;
-      blocks[slot] = block;
-      return true;
-    }
-    return false;
-  }
-
-  /// @return where the block of `key` stands, null when absent.  @thread one, while nobody inserts
-  STILLMAP_HD BlockId* slot_of(BlockKey key) const {
-    const uint32_t mask = keys.size - 1;
-    uint32_t slot = static_cast<uint32_t>(hash_of(key)) & mask;
-    for (uint32_t probe = 0; probe < kMaxProbes; ++probe, slot = (slot + 1) & mask) {
-      if (keys[slot] == key) return &blocks[slot];
-      if (keys[slot] == kEmptyKey) return nullptr;
-    }
-    return nullptr;
-  }
-
   static constexpr uint32_t kMaxProbes = 128;
   static constexpr BlockId kPending = kNoBlock - 1;
 
   /// @return kNoBlock when absent.  @thread any, also while others insert
   STILLMAP_HD BlockId find(BlockKey key) const {
-    const uint32_t mask = keys.size - 1;
-    uint32_t slot = static_cast<uint32_t>(hash_of(key)) & mask;
-    for (uint32_t probe = 0; probe < kMaxProbes; ++probe, slot = (slot + 1) & mask) {
-      const BlockKey found = atomic_load(&keys[slot]);
-      if (found == key) {
-        const BlockId block = atomic_load(&blocks[slot]);
-        return block == kPending ? kNoBlock : block;
-      }
-      if (found == kEmptyKey) return kNoBlock;
-    }
-    return kNoBlock;
+    const uint32_t slot = slot_for(key);
+    if (slot == kNoSlot || atomic_load(&keys[slot]) != key) return kNoBlock;
+    const BlockId block = atomic_load(&blocks[slot]);
+    return block == kPending ? kNoBlock : block;
+  }
+  /// @return where the block of `key` stands, null when absent.  @thread one, while nobody inserts
+  STILLMAP_HD BlockId* slot_of(BlockKey key) const {
+    const uint32_t slot = slot_for(key);
+    return slot == kNoSlot || keys[slot] != key ? nullptr : &blocks[slot];
+  }
+  /// Adds a key that is not there, with its block. False: no slot within kMaxProbes.  @thread one, while
+  /// nobody inserts
+  STILLMAP_HD bool put(BlockKey key, BlockId block) const {
+    const uint32_t slot = slot_for(key);
+    if (slot == kNoSlot) return false;
+    keys[slot] = key;
+    blocks[slot] = block;
+    return true;
   }
 
   /// Finds or adds.  @thread any, at the same time as other inserts and finds
@@ -83,6 +66,18 @@ struct HashView {
   }
 
  private:
+  static constexpr uint32_t kNoSlot = ~0u;
+
+  /// The slot that holds `key`, or the free one where it would go; kNoSlot: neither within kMaxProbes.
+  STILLMAP_HD uint32_t slot_for(BlockKey key) const {
+    const uint32_t mask = keys.size - 1;
+    uint32_t slot = static_cast<uint32_t>(hash_of(key)) & mask;
+    for (uint32_t probe = 0; probe < kMaxProbes; ++probe, slot = (slot + 1) & mask) {
+      const BlockKey found = atomic_load(&keys[slot]);
+      if (found == key || found == kEmptyKey) return slot;
+    }
+    return kNoSlot;
+  }
   /// The slot has our key: give it a block unless somebody did or does.
   STILLMAP_HD InsertResult claim(uint32_t slot, const PoolView& pool) const {
     BlockId found = atomic_load(&blocks[slot]);

@@ -25,6 +25,7 @@ constexpr uint32_t kMostPutAwayPerFrame = 8;
 constexpr uint32_t kFarAtOnce = 256;  ///< found by one walk over the table
 constexpr size_t kMostFolderLetters = 400;
 constexpr auto kWorkerWait = std::chrono::milliseconds(100);
+constexpr auto kLongestAnswer = std::chrono::milliseconds(30000);  ///< of the disk, for one group
 
 /// FNV-1a: a file that was cut or changed is seen.
 uint64_t checksum(const uint8_t* bytes, uint32_t count) {
@@ -77,6 +78,11 @@ std::string folder_below(const std::string& dir) {
 }
 
 }  // namespace
+
+uint64_t BlockArchive::planned_bytes(const Options& options) {
+  return uint64_t{options.slots} * (kMaxGroupRecordBytes + sizeof(Slot)) +
+         uint64_t{options.max_groups} * (sizeof(Entry) + sizeof(uint32_t));
+}
 
 Result<std::unique_ptr<BlockArchive>> BlockArchive::open(const Options& options) {
   const std::string folder = folder_below(options.dir);
@@ -300,8 +306,11 @@ std::string BlockArchive::last_error() const {
 
 std::string BlockArchive::for_each(Engine& engine, const std::function<bool(View<const uint8_t> record)>& f) {
   uint32_t number = 0;
-  while (free_slots_.size() < slots_.size())
-    if (answers_.pop_within(number, kWorkerWait)) take_answer(engine, number);
+  while (free_slots_.size() < slots_.size()) {
+    if (!answers_.pop_within(number, kLongestAnswer))
+      return fmt::format("{}: the disk did not answer within {} s", folder_, kLongestAnswer.count() / 1000);
+    take_answer(engine, number);
+  }
   Slot slot;
   slot.record.resize(kMaxGroupRecordBytes);
   for (const Entry& entry : entries_) {

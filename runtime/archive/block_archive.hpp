@@ -42,6 +42,8 @@ class BlockArchive {
     uint32_t slots = 32;      ///< groups on their way; each takes kMaxGroupRecordBytes
   };
 
+  /// Memory that it takes at boot and keeps, for the plan.
+  static uint64_t planned_bytes(const Options& options);
   /// @return an error that names the folder and what to do.  @thread boot
   static Result<std::unique_ptr<BlockArchive>> open(const Options& options);
   ~BlockArchive();

@@ -7,6 +7,7 @@
 
 #include "kernels/engine.hpp"
 #include "tests/support/corner_scene.hpp"
+#include "tests/support/corner_states.hpp"
 
 namespace stillmap::test {
 
@@ -43,16 +44,7 @@ class MappedCorner {
     engine->prepare({view.image(view.depth_raw), view.image(view.colour)});
     engine->integrate(cast<float>(T));
   }
-  std::vector<PointState> states() const {
-    std::vector<Vec3> points;
-    for (float z = -0.2f; z < 2.4f; z += 0.053f)
-      for (float y = -1.5f; y < 1.0f; y += 0.053f)
-        for (float x = -2.0f; x < 1.2f; x += 0.053f) points.push_back({x, y, z});
-    std::vector<PointState> states(points.size());
-    const auto count = static_cast<uint32_t>(points.size());
-    engine->look_up({points.data(), count}, {states.data(), count});
-    return states;
-  }
+  std::vector<PointState> states() const { return states_in_corner(*engine, 0.053f); }
 
   std::unique_ptr<Engine> engine;
 

@@ -9,6 +9,7 @@
 #include "kernels/map/group_record.hpp"
 #include "kernels/mask/grow_mask.hpp"
 #include "tests/support/corner_scene.hpp"
+#include "tests/support/corner_states.hpp"
 #include "tests/support/mesh_recorder.hpp"
 #include "tests/support/test_image.hpp"
 
@@ -411,16 +412,8 @@ TEST(CpuEngine, ATinyPoolIsCountedAndFarBlocksAreDropped) {
   rig.depth_of_map(k);
 }
 
-/// States of a grid of points in the box that the corner camera looks into.
 std::vector<PointState> states_of(const Engine& engine) {
-  std::vector<Vec3> points;
-  for (float z = -0.2f; z < 2.4f; z += 0.031f)
-    for (float y = -1.5f; y < 1.0f; y += 0.031f)
-      for (float x = -2.0f; x < 1.2f; x += 0.031f) points.push_back({x, y, z});
-  std::vector<PointState> states(points.size());
-  const auto count = static_cast<uint32_t>(points.size());
-  engine.look_up({points.data(), count}, {states.data(), count});
-  return states;
+  return test::states_in_corner(engine, 0.031f);
 }
 
 TEST(CpuEngine, BothFormsOfFreeSpaceKnowTheSameAndOneTakesAFractionOfTheMemory) {
