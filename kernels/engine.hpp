@@ -180,13 +180,23 @@ class Engine {
   /// @param states as many as points (map frame, metres)
   virtual void look_up(View<const Vec3> points_map_m, View<PointState> states) const = 0;
   /// The map in pieces (kernels/map/group_record.hpp), to be saved, archived or copied.
-  /// @return how many there are; as many of their keys as fit, ascending when all fit
+  /// @return how many there are (never above group_capacity); as many of their keys as fit, ascending when
+  /// all fit
   virtual uint32_t list_groups(View<uint64_t> keys) const = 0;
   /// @return bytes of the record; 0: there is no such group, or it does not fit
   virtual uint32_t write_group(uint64_t key, View<uint8_t> record) const = 0;
   /// Puts a group into the map, in place of what is known there.
   /// @return bad_data: not a record; capacity_exhausted: no room, nothing was changed
   virtual Status read_group(View<const uint8_t> record) = 0;
+  virtual uint32_t group_capacity() const = 0;
+  /// The keyframes of find_place (kernels/relocalise/place_record.hpp), numbered from 0.
+  virtual uint32_t place_count() const = 0;
+  /// @return bytes of the record; 0: there is no such keyframe, or it does not fit
+  virtual uint32_t write_place(uint32_t index, View<uint8_t> record) const = 0;
+  /// Adds a keyframe; when the store is full it replaces the most redundant one.
+  /// @return bad_data: not a record; unavailable: of another size of camera or number of ferns, nothing was
+  /// changed
+  virtual Status read_place(View<const uint8_t> record) = 0;
 
   /// Groups with blocks that the last integrated frame does not come near, the farthest from `centre_map`
   /// first. @return how many

@@ -214,7 +214,6 @@ class CpuEngine final : public Engine {
   uint32_t write_group(uint64_t key, View<uint8_t> record) const override {
     return memory_.map.write_group(key, record);
   }
-  Status read_group(View<const uint8_t> record) override { return memory_.map.read_group(record); }
   uint32_t farthest_groups(Vec3 centre_map, View<uint64_t> keys) override {
     if (groups_looked_at_ == 0) return 0;  // nothing was integrated yet
     return memory_.map.farthest_groups(centre_map, keys,
@@ -223,6 +222,17 @@ class CpuEngine final : public Engine {
   void put_away(uint64_t key, uint32_t entry) override { memory_.map.put_away(key, entry); }
   void forget_group(uint64_t key) override { memory_.map.forget_group(key); }
   uint32_t wanted_groups(View<ArchivedGroup> groups) const override;
+  Status read_group(View<const uint8_t> record) override {
+    const Status status = memory_.map.read_group(record);
+    continued_ = continued_ || (status == Status::ok && masks_ == 0);
+    return status;
+  }
+  uint32_t group_capacity() const override { return memory_.map.view().table.keys.size; }
+  uint32_t place_count() const override { return static_cast<uint32_t>(memory_.relocaliser.keyframes()); }
+  uint32_t write_place(uint32_t index, View<uint8_t> record) const override {
+    return memory_.relocaliser.write(index, record);
+  }
+  Status read_place(View<const uint8_t> record) override { return memory_.relocaliser.read(record); }
 
   ImageView<const uint8_t> mask_image() const override { return memory_.mask; }
   ImageView<const float> depth_image_m() const override { return memory_.depth_m; }
@@ -275,8 +285,9 @@ class CpuEngine final : public Engine {
   VisibleGroupPass last_view_;  ///< of the last integrated frame
   uint32_t groups_looked_at_ = 0;
   float usual_ = 1.0f;
-  Se3 T_before_;        ///< pose of the last mask
-  uint32_t masks_ = 0;  ///< masks made since the map was empty
+  Se3 T_before_;            ///< pose of the last mask
+  uint32_t masks_ = 0;      ///< masks made since the map was empty
+  bool continued_ = false;  ///< the map, or part of it, is older than this engine
 };
 
 void CpuEngine::fill_source_pixels() {
@@ -368,7 +379,7 @@ void CpuEngine::make_cells() {
 /// Trust of every pixel: from the expected mask before the decision, from the mask after it. In a young map
 /// nothing is better known than what is near: without it the pose slides along the rest.
 void CpuEngine::write_static_pixels(bool masked) {
-  const bool young = masks_ < static_cast<uint32_t>(params_.mask.reabsorb_frames);
+  const bool young = !continued_ && masks_ < static_cast<uint32_t>(params_.mask.reabsorb_frames);
   StaticPixelPass pass{memory_.cells,
                        memory_.depth_m,
                        masked ? memory_.mask : ImageView<uint8_t>{},
@@ -444,6 +455,7 @@ void CpuEngine::forget_cells() {
   for (const EarlierCells& earlier : memory_.earlier)
     std::fill_n(earlier.depth_m.data, earlier.depth_m.pixels(), 0.0f);
   masks_ = 0;
+  continued_ = false;
   usual_ = 1.0f;
   T_before_ = {};
 }

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "kernels/backend/cpu/raycast.hpp"
 #include "kernels/relocalise/fern_code.hpp"
+#include "kernels/relocalise/place_record.hpp"
 #include "kernels/relocalise/view_check.hpp"
 
 namespace stillmap {
@@ -31,6 +33,14 @@ Intrinsics widened(const Intrinsics& k) {
           k.cy + static_cast<float>(y),
           k.width + 2 * x,
           k.height + 2 * y};
+}
+
+bool is_pose(const Se3& T) {
+  constexpr float kRounding = 1e-3f;
+  const Mat3 unit = T.rotation * transposed(T.rotation);
+  for (int32_t i = 0; i < 9; ++i)
+    if (!(std::fabs(unit.m[i] - (i % 4 == 0 ? 1.0f : 0.0f)) < kRounding)) return false;
+  return std::isfinite(norm(T.translation));
 }
 
 /// Gauss-Newton step about the camera centre. @return false when the system is singular
@@ -170,6 +180,10 @@ void CpuRelocaliser::encode() {
     }
   const FernPass ferns{small_[1], cells > 0 ? luma / static_cast<float>(cells) : 0.0f, code_};
   for (uint32_t f = 0; f < code_.size; ++f) ferns(f);
+  compare_with_keyframes();
+}
+
+void CpuRelocaliser::compare_with_keyframes() {
   for (uint32_t i = 0; i < count_; ++i)
     similarity_[i] = code_similarity({code_.data, code_.size}, code_of(i));
 }
@@ -227,6 +241,29 @@ void CpuRelocaliser::remember(const PreparedView& frame, const Se3& T_map_cam) {
   encode();
   if (!shows_something_new(T_map_cam)) return;
   insert(count_ < keyframes_.size ? count_ : most_redundant(), T_map_cam);
+}
+
+uint32_t CpuRelocaliser::write(uint32_t keyframe, View<uint8_t> record) const {
+  const uint32_t bytes = static_cast<uint32_t>(sizeof(PlaceRecordHead)) + code_.size;
+  if (keyframe >= count_ || record.size < bytes) return 0;
+  const PlaceRecordHead head = {keyframes_[keyframe].T_map_cam, code_.size, k_[1].height, k_[1].width};
+  std::memcpy(record.data, &head, sizeof head);
+  std::memcpy(record.data + sizeof head, code_of(keyframe).data, code_.size);
+  return bytes;
+}
+
+Status CpuRelocaliser::read(View<const uint8_t> record) {
+  PlaceRecordHead head;
+  if (record.size < sizeof head) return Status::bad_data;
+  std::memcpy(&head, record.data, sizeof head);
+  if (head.ferns != record.size - sizeof head || !is_pose(head.T_map_cam)) return Status::bad_data;
+  const bool usable =
+      params_.enabled && head.ferns == code_.size && head.rows == k_[1].height && head.cols == k_[1].width;
+  if (!usable) return Status::unavailable;
+  std::memcpy(code_.data, record.data + sizeof head, code_.size);
+  compare_with_keyframes();
+  insert(count_ < keyframes_.size ? count_ : most_redundant(), head.T_map_cam);
+  return Status::ok;
 }
 
 /// The most similar keyframes, in falling order. @return how many

@@ -32,6 +32,10 @@ class CpuRelocaliser {
   PlaceResult confirm(const PreparedView& frame, const VolumeView& map, const Se3& T_map_cam_start,
                       ThreadPool& threads);
 
+  /// See Engine::write_place and read_place.
+  uint32_t write(uint32_t keyframe, View<uint8_t> record) const;
+  Status read(View<const uint8_t> record);
+
   int32_t keyframes() const { return static_cast<int32_t>(count_); }
 
  private:
@@ -54,6 +58,7 @@ class CpuRelocaliser {
   View<const uint8_t> code_of(uint32_t keyframe) const;
   void shrink(const PreparedView& frame);
   void encode();
+  void compare_with_keyframes();
   bool shows_something_new(const Se3& T_map_cam) const;
   void insert(uint32_t place, const Se3& T_map_cam);
   void find_closest(uint32_t keyframe);

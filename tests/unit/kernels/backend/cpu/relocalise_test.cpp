@@ -5,6 +5,7 @@
 #include <cstring>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "kernels/engine.hpp"
 #include "tests/support/corner_scene.hpp"
@@ -58,6 +59,62 @@ TEST_F(Relocalise, FindsAPlaceBetweenTwoThatWereSeen) {
   EXPECT_LT(off_m(r, kBetween), 0.01);
   EXPECT_GT(r.check.on, 0.8f);
   EXPECT_GT(r.check.texture_correlation, 0.8f);
+}
+
+TEST_F(Relocalise, KeyframesThatWereReadBackFindTheSamePlace) {
+  std::vector<std::vector<uint8_t>> places, groups;
+  std::vector<uint8_t> record(1 << 19);
+  const View<uint8_t> space{record.data(), 1 << 19};
+  std::vector<uint64_t> keys(engine->group_capacity());
+  keys.resize(engine->list_groups({keys.data(), engine->group_capacity()}));
+  for (const uint64_t key : keys)
+    groups.emplace_back(record.data(), record.data() + engine->write_group(key, space));
+  ASSERT_EQ(engine->place_count(), 2u);
+  for (uint32_t i = 0; i < 2; ++i)
+    places.emplace_back(record.data(), record.data() + engine->write_place(i, space));
+  EXPECT_EQ(engine->write_place(2, space), 0u);
+  EXPECT_EQ(engine->write_place(0, {record.data(), 100}), 0u);
+
+  engine->reset_map();
+  EXPECT_EQ(engine->place_count(), 0u);
+  const auto view = [](const std::vector<uint8_t>& bytes) {
+    return View<const uint8_t>{bytes.data(), static_cast<uint32_t>(bytes.size())};
+  };
+  for (const auto& group : groups) ASSERT_EQ(engine->read_group(view(group)), Status::ok);
+  for (const auto& place : places) ASSERT_EQ(engine->read_place(view(place)), Status::ok);
+  look(CornerScene{}, kBetween);
+  const PlaceResult r = engine->find_place(cast<float>(kFar), 0);
+  EXPECT_EQ(r.status, Status::ok);
+  EXPECT_EQ(r.keyframes, 2);
+  EXPECT_LT(off_m(r, kBetween), 0.01);
+}
+
+TEST_F(Relocalise, KeyframesThatCannotBeReadChangeNothing) {
+  std::vector<uint8_t> record(1000);
+  record.resize(engine->write_place(0, {record.data(), 1000}));
+  const auto answer = [&](const std::vector<uint8_t>& bytes) {
+    return engine->read_place({bytes.data(), static_cast<uint32_t>(bytes.size())});
+  };
+  for (const size_t bytes : {size_t{0}, size_t{59}, size_t{60}, record.size() - 1})
+    EXPECT_EQ(answer({record.begin(), record.begin() + static_cast<std::ptrdiff_t>(bytes)}),
+              Status::bad_data);
+  auto turned = record;
+  turned[3] ^= 0x40;  // no rotation any more
+  EXPECT_EQ(answer(turned), Status::bad_data);
+  auto other_camera = record;
+  other_camera[52] ^= 1;  // rows of the view
+  EXPECT_EQ(answer(other_camera), Status::unavailable);
+  EXPECT_EQ(engine->place_count(), 2u);
+}
+
+TEST_F(Relocalise, AFullStoreGivesUpItsMostRedundantKeyframe) {
+  std::vector<uint8_t> record(1000);
+  record.resize(engine->write_place(0, {record.data(), 1000}));
+  for (int i = 0; i < 40; ++i)
+    ASSERT_EQ(engine->read_place({record.data(), static_cast<uint32_t>(record.size())}), Status::ok);
+  EXPECT_EQ(engine->place_count(), 16u);
+  look(CornerScene{}, kBetween);
+  EXPECT_EQ(engine->find_place(cast<float>(kFar), 0).status, Status::ok);
 }
 
 TEST_F(Relocalise, SomeoneInTheWayDoesNotHinder) {
