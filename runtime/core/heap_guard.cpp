@@ -22,6 +22,7 @@ namespace {
 // Relaxed is enough: arm and disarm stand around calls that synchronise with the workers by themselves.
 std::atomic<bool> g_armed{false};
 std::atomic<uint64_t> g_allocations{0};
+thread_local bool t_exempt = false;
 
 }  // namespace
 
@@ -35,7 +36,11 @@ uint64_t allocations() {
   return g_allocations.load(std::memory_order_relaxed);
 }
 void note() {
-  if (g_armed.load(std::memory_order_relaxed)) g_allocations.fetch_add(1, std::memory_order_relaxed);
+  if (g_armed.load(std::memory_order_relaxed) && !t_exempt)
+    g_allocations.fetch_add(1, std::memory_order_relaxed);
+}
+void exempt_this_thread() {
+  t_exempt = true;
 }
 bool counts() {
   return STILLMAP_HEAP_GUARD != 0;

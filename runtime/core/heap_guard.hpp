@@ -16,6 +16,8 @@ void disarm();
 uint64_t allocations();
 /// Counts one allocation when armed; for hooks of other allocators (tests hook malloc). @thread any
 void note();
+/// From now on the calling thread may allocate: it is none that real time waits for, or that it runs on.
+void exempt_this_thread();
 /// False under AddressSanitizer and ThreadSanitizer, whose own operator new stays in place: nothing is
 /// counted there.
 bool counts();
