@@ -49,6 +49,12 @@ Pipeline::Pipeline(Engine& engine, const Config& config, const Se3d& T_map_cam, 
       predictor_(config, T_map_cam, odometry),
       T_map_cam_(T_map_cam) {}
 
+void Pipeline::start_lost(const Se3d& T_map_cam_guess) {
+  T_map_cam_ = T_map_cam_guess;
+  predictor_.restart(stamp_, T_map_cam_guess);
+  have_map_ = lost_ = true;
+}
+
 FrameResult Pipeline::process(const RgbdFrame& frame) {
   StopWatch total, watch;
   FrameResult result;

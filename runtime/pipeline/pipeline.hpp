@@ -50,6 +50,11 @@ class Pipeline {
   Pipeline(Engine& engine, const Config& config, const Se3d& T_map_cam = {},
            OdometryPort* odometry = nullptr);
 
+  /// The engine holds a map already: the camera is looked for in it before anything is mapped. Where
+  /// relocalise.enabled is false it is tracked on from the guess.
+  /// @param T_map_cam_guess tried first  @thread boot                          test: pipeline_test
+  void start_lost(const Se3d& T_map_cam_guess);
+
   FrameResult process(const RgbdFrame& frame);
 
   const PipelineCounters& counters() const { return counters_; }

@@ -58,6 +58,10 @@ class ScriptedEngine : public Engine {
   void put_away(uint64_t, uint32_t) override {}
   void forget_group(uint64_t) override {}
   uint32_t wanted_groups(View<ArchivedGroup>) const override { return 0; }
+  uint32_t group_capacity() const override { return 0; }
+  uint32_t place_count() const override { return 0; }
+  uint32_t write_place(uint32_t, View<uint8_t>) const override { return 0; }
+  Status read_place(View<const uint8_t>) override { return Status::unavailable; }
   ImageView<const uint8_t> mask_image() const override { return {nullptr, 10, 20, 20}; }
   ImageView<const float> depth_image_m() const override { return {}; }
   ImageView<const Rgb8> colour_image() const override { return {}; }
@@ -121,6 +125,35 @@ TEST_F(PipelineTest, TheFirstFrameIsTheMap) {
   EXPECT_EQ(result.sequence, 33u);
   EXPECT_EQ(result.map.blocks, 77u);
   EXPECT_EQ(pipeline.counters().frames, 1u);
+}
+
+TEST_F(PipelineTest, InAMapThatIsThereTheCameraIsFoundBeforeAnythingIsMapped) {
+  Pipeline pipeline(engine_, config_);
+  pipeline.start_lost(cast<double>(at(3)));
+  answer(at(4));
+  FrameResult result = process(pipeline, 33);
+  EXPECT_EQ(engine_.calls, "pf");  // no integration
+  EXPECT_EQ(engine_.find_guess.translation.x, 3.0f);
+  EXPECT_EQ(result.state, TrackingState::lost);
+  EXPECT_EQ(result.T_map_cam.translation.x, 3.0);
+  engine_.place.status = Status::ok;
+  engine_.place.T_map_cam = at(4);
+  for (int frame = 2; result.state == TrackingState::lost && frame < 10; ++frame)
+    result = process(pipeline, 33 * frame);
+  EXPECT_EQ(result.state, TrackingState::good);
+  EXPECT_EQ(engine_.calls.back(), 'i');
+  EXPECT_EQ(result.T_map_cam.translation.x, 4.0);
+  EXPECT_EQ(pipeline.counters().relocalised, 1u);
+}
+
+TEST_F(PipelineTest, WithoutASearchTheMapIsGoneOnWithFromTheGuess) {
+  config_.relocalise.enabled = false;
+  Pipeline pipeline(engine_, config_);
+  pipeline.start_lost(cast<double>(at(3)));
+  answer(at(3));
+  EXPECT_EQ(process(pipeline, 33).state, TrackingState::good);
+  EXPECT_EQ(engine_.calls.substr(0, 2), "pt");
+  EXPECT_EQ(engine_.track_start.translation.x, 3.0f);
 }
 
 TEST_F(PipelineTest, TheInitialPoseIsThatOfTheFirstFrame) {
