@@ -102,6 +102,7 @@ struct RecordConfig {
   bool masks = false;
   bool mesh = true;
   bool map = false;
+  float map_every_s = 0;
   bool log = false;
   int32_t snapshots = 8;
   int32_t keep_previous = 3;
@@ -112,6 +113,8 @@ struct RecordConfig {
     f("masks", &P::masks, 0, 1, "bool", "III-C", "write masks/STAMP.png (and masks_truth/ where known)");
     f("mesh", &P::mesh, 0, 1, "bool", "III-A", "write mesh.ply at the end");
     f("map", &P::map, 0, 1, "bool", "ours", "write map.smap at the end");
+    f("map_every_s", &P::map_every_s, 0, 1e6, "s", "ours",
+      "with map: write it on the way as well, so often; 0: only at the end");
     f("log", &P::log, 0, 1, "bool", "ours", "write an LCM event log");
     f("snapshots", &P::snapshots, 0, 1000, "frames", "Fig. 1",
       "frames kept with mask and reprojected map for `stillmap picture`");

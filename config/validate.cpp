@@ -119,11 +119,15 @@ void check_source(const SourceConfig& source, Violations& out) {
              setting("source.wait_s", source.wait_s) + ": allowed 0 and above, or -1 for ever");
 }
 
+void check_record(const RecordConfig& record, Violations& out) {
+  out.unless(record.map || record.map_every_s == 0,
+             setting("record.map_every_s", record.map_every_s) + ": has no effect while record.map is false");
+}
+
 void check_missing_parts(const Config& config, Violations& out) {
   const char* missing = " is not part of this build; ";
   if (config.depth.invalid == InvalidDepth::complete)
     out.add(std::string("depth.invalid = complete") + missing + "set depth.invalid = \"ignore\"");
-  if (config.record.map) out.add(std::string("record.map = true") + missing + "set record.map = false");
   if (config.record.log) out.add(std::string("record.log = true") + missing + "set record.log = false");
 }
 
@@ -139,6 +143,7 @@ std::vector<std::string> violations(const Config& config) {
   check_track(config, out);
   check_map(config.map, out);
   check_archive(config, out);
+  check_record(config.record, out);
   check_missing_parts(config, out);
   return out.take();
 }

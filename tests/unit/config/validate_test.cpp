@@ -135,11 +135,14 @@ TEST(Validate, WaitIsForeverOrNotNegative) {
   EXPECT_TRUE(mentions(after([](Config& c) { c.source.wait_s = -0.5f; }), "source.wait_s = -0.5"));
 }
 
+TEST(Validate, MapOnTheWayNeedsAMap) {
+  EXPECT_TRUE(after([](Config& c) { c.record.map = true, c.record.map_every_s = 60; }).empty());
+  EXPECT_TRUE(mentions(after([](Config& c) { c.record.map_every_s = 60; }), "record.map_every_s = 60.0"));
+}
+
 TEST(Validate, PartsOfOtherBuildsAreNamed) {
   EXPECT_TRUE(mentions(after([](Config& c) { c.depth.invalid = InvalidDepth::complete; }),
                        "depth.invalid = complete is not part of this build"));
-  EXPECT_TRUE(
-      mentions(after([](Config& c) { c.record.map = true; }), "record.map = true is not part of this build"));
   EXPECT_TRUE(
       mentions(after([](Config& c) { c.record.log = true; }), "record.log = true is not part of this build"));
 }
