@@ -7,7 +7,9 @@
 #include <chrono>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <thread>
+#include <utility>
 
 #include "config/engine_params.hpp"
 #include "config/memory_plan.hpp"
@@ -20,6 +22,7 @@
 #include "firmware-like/commands/run_outputs.hpp"
 #include "firmware-like/commands/stop_signal.hpp"
 #include "runtime/archive/block_archive.hpp"
+#include "runtime/archive/map_file.hpp"
 #include "runtime/core/heap_guard.hpp"
 
 namespace stillmap {
@@ -38,6 +41,25 @@ Result<std::unique_ptr<FrameSource>> open_waiting(const std::string& name, const
       return source;
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
   }
+}
+
+/// The map to go on with, found whole and fit for this configuration; none where none was asked for.
+Result<std::optional<MapFile>> open_map(const std::string& path, const Config& config) {
+  if (path.empty()) return std::optional<MapFile>();
+  auto file = MapFile::open(path);
+  if (!file) return Error{"--map " + file.error(), file.error_kind()};
+  if (const auto fits = file->check_against(config); !fits)
+    return Error{"--map " + fits.error(), fits.error_kind()};
+  return std::optional<MapFile>(std::move(*file));
+}
+
+std::string map_text(const std::string& path, const MapFile& file, const LoadedMap& loaded) {
+  std::string text = fmt::format("{}: {} groups of blocks, {} keyframes, written by stillmap {}", path,
+                                 file.contents().groups, loaded.places, file.info().program_version);
+  if (loaded.foreign_places > 0)
+    text += fmt::format("; {} keyframes of another image size or relocalise.ferns are of no use here",
+                        loaded.foreign_places);
+  return text;
 }
 
 /// Frames that will be read, -1 when nobody knows.
@@ -62,6 +84,9 @@ void print_summary(const RunOptions& o, const RunOutputs& outputs, const Pipelin
                outputs.mesh_triangles() > 0 ? fmt::format(", {}/mesh.ply ({} triangles in {:.1f} s)", o.out,
                                                           outputs.mesh_triangles(), outputs.mesh_seconds())
                                             : "");
+  if (outputs.map_bytes() > 0)
+    fmt::print("{}/map.smap ({:.1f} MB in {:.1f} s); `stillmap run --map` goes on with it\n", o.out,
+               static_cast<double>(outputs.map_bytes()) * 1e-6, outputs.map_seconds());
 }
 
 int exit_code_of(const LoopEnd& end, const RunOutputs& outputs, const PipelineCounters& counters) {
@@ -84,6 +109,9 @@ int run(const RunOptions& o, FrameObserver* observer) {
   if (!plan) return fail(plan.error(), plan.error_kind());
   const Config& config = plan->config;
 
+  auto map = open_map(o.map, config);
+  if (!map) return fail(map.error(), map.error_kind());
+
   auto opened = open_waiting(o.source, config);
   if (!opened) return stop_requested() ? kExitDone : fail(opened.error(), opened.error_kind());
   FrameSource& source = **opened;
@@ -99,6 +127,13 @@ int run(const RunOptions& o, FrameObserver* observer) {
                     memory.total_bytes / 1000000),
         ErrorKind::failed);
 
+  std::string loaded_text;
+  if (MapFile* const file = map->has_value() ? &**map : nullptr) {
+    const auto loaded = file->load(*engine);
+    if (!loaded) return fail("--map " + loaded.error(), loaded.error_kind());
+    loaded_text = map_text(o.map, *file, *loaded);
+  }
+
   SourceInfo info = source.info();
   info.camera = params.camera;
   const int64_t frames = expected_frames(info, o);
@@ -113,10 +148,14 @@ int run(const RunOptions& o, FrameObserver* observer) {
     if (!made) return fail(made.error(), ErrorKind::failed);
     archive = std::move(*made);
   }
+  if (!loaded_text.empty()) (*outputs)->event(Stamp{}, "map_load", loaded_text);
+  (*outputs)->prepare_map(*engine);
 
   if (observer) observer->begin(source, info);
   FrameSlot slot(info);
   Pipeline pipeline(*engine, config, plan->T_map_cam, source.odometry());
+  if (map->has_value())
+    pipeline.start_lost(o.initial_pose.empty() ? (*map)->info().T_map_cam : plan->T_map_cam);
   Progress progress(frames, o.quiet);
   const LoopEnd end = run_loop(source, *engine, pipeline, **outputs, progress, slot.frame(), o.max_frames,
                                observer, archive.get());

@@ -50,7 +50,6 @@ std::string part_not_built(const RunOptions& o) {
   if (o.device == "cuda")
     return "--device cuda: this build has no CUDA engine; use --device auto or --device cpu";
   if (o.lcm != "off") return "--lcm " + o.lcm + ": LCM is not part of this build; use --lcm off";
-  if (!o.map.empty()) return "--map " + o.map + ": saved maps are not part of this build; leave the flag out";
   if (o.realtime)
     return "--realtime: playing at the pace of the stamps is not part of this build; leave the flag out";
   return {};
@@ -65,7 +64,7 @@ void declare_run_flags(CLI::App& command, RunOptions& o) {
       ->required();
   command.add_option("--config", o.config, "TOML file (default: the built-in default preset)");
   command.add_option("--out", o.out, "folder for trajectory, mesh and report; without it nothing is written");
-  command.add_option("--map", o.map, "start from this saved map");
+  command.add_option("--map", o.map, "go on with this saved map (map.smap): the camera is looked for in it");
   command.add_option("--device", o.device, "auto, cuda or cpu")
       ->check(CLI::IsMember({"auto", "cuda", "cpu"}))
       ->capture_default_str();
@@ -78,7 +77,8 @@ void declare_run_flags(CLI::App& command, RunOptions& o) {
   command.add_option("--skip-frames", o.skip_frames, "pass over the first frames");
   command.add_flag("--realtime", o.realtime, "at the pace of the stamps, newest first");
   command.add_option("--lcm", o.lcm, "LCM URL or off")->capture_default_str();
-  command.add_option("--initial-pose", o.initial_pose, "X,Y,Z,QX,QY,QZ,QW of the first frame, camera to map");
+  command.add_option("--initial-pose", o.initial_pose,
+                     "X,Y,Z,QX,QY,QZ,QW of the first frame, camera to map; with --map the first guess");
   command.add_option("--set", o.settings, "section.key=value, over the configuration file; may be repeated")
       ->allow_extra_args(false);
   command.add_flag("--quiet", o.quiet, "no progress, no summary");

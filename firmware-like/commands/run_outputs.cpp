@@ -4,11 +4,13 @@
 
 #include <chrono>
 #include <cstdio>
+#include <thread>
 #include <utility>
 
 #include "config/describe.hpp"
 #include "config/engine_params.hpp"
 #include "runtime/archive/whole_mesh.hpp"
+#include "runtime/core/heap_guard.hpp"
 #include "runtime/image/image_file.hpp"
 #include "runtime/record/output_file.hpp"
 #include "runtime/record/ply_writer.hpp"
@@ -87,6 +89,7 @@ void RunOutputs::add(const RgbdFrame& frame, const FrameResult& result, Engine& 
       tell(file->error());
     tell(events_.error());
   }
+  save_map_on_the_way(result);
   last_ = result;
   ++frames_seen_;
 }
@@ -110,8 +113,8 @@ void RunOutputs::note_changes(const FrameResult& r) {
 
 void RunOutputs::add_truth(const RgbdFrame& frame, const FrameResult& result) {
   if (!frame.truth_T_world_cam) return;
-  if (!truth_.anchored() && result.status != Status::bad_data)
-    truth_.anchor(result.T_map_cam, *frame.truth_T_world_cam);
+  const bool has_pose = result.status != Status::bad_data && result.state != TrackingState::lost;
+  if (!truth_.anchored() && has_pose) truth_.anchor(result.T_map_cam, *frame.truth_T_world_cam);
   if (!truth_.anchored()) return;
   if (!files_->truth) {
     auto writer = TrajectoryWriter::create(files_->folder.path("truth.txt"));
@@ -205,12 +208,68 @@ void RunOutputs::note_archive(const BlockArchive& archive) {
   if (c.failed > 0) events_.fault(last_stamp_, "archive_failed", archive.last_error());
 }
 
+void RunOutputs::prepare_map(const Engine& engine) {
+  if (record_.map && files_) map_saver_ = std::make_unique<MapSaver>(files_->folder.path("map.smap"), engine);
+}
+
+void RunOutputs::save_map_on_the_way(const FrameResult& result) {
+  if (!map_saver_) return;
+  const auto period_ns = static_cast<int64_t>(static_cast<double>(record_.map_every_s) * 1e9);
+  if (!map_save_due_) map_save_due_ = Stamp{result.stamp.ns + period_ns};
+  {
+    const heap_guard::Scope armed;  // live, these run in the real-time loop
+    if (period_ns > 0 && result.stamp >= *map_save_due_ && result.state != TrackingState::lost &&
+        map_saver_->begin(MapInfo::of(config_, result.T_map_cam, result.stamp))) {
+      map_saving_ = true;
+      map_save_due_->ns = result.stamp.ns + period_ns;
+    }
+    map_saver_->step();
+  }
+  note_map_save();
+}
+
+/// How far it is, once a second; how it ended.
+void RunOutputs::note_map_save() {
+  if (!map_saving_) return;
+  const SaveProgress progress = map_saver_->progress();
+  const auto now = std::chrono::steady_clock::now();
+  if (progress.saving) {
+    if (now < map_progress_due_) return;
+    map_progress_due_ = now + std::chrono::seconds(1);
+    return events_.info(
+        last_stamp_, "map_save",
+        fmt::format("{} of {} groups of blocks copied", progress.groups_done, progress.groups));
+  }
+  map_saving_ = false;
+  const SaveResult& result = map_saver_->result();
+  tell(result.error);
+  if (!result.error.empty()) return;
+  map_bytes_ = result.bytes;
+  map_seconds_ = result.seconds;
+  events_.info(last_stamp_, "map_save",
+               fmt::format("{}: {} groups of blocks, {:.1f} MB in {:.2f} s", map_saver_->path(),
+                           progress.groups, static_cast<double>(result.bytes) * 1e-6, result.seconds));
+}
+
+/// A save that is on its way is of an earlier map: it is ended first.
+void RunOutputs::save_map_at_end() {
+  const auto end_save = [&] {
+    for (; map_saver_->progress().saving; note_map_save())
+      if (!map_saver_->step()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    note_map_save();
+  };
+  end_save();
+  map_saving_ = map_saver_->begin(MapInfo::of(config_, last_.T_map_cam, last_.stamp));
+  end_save();
+}
+
 void RunOutputs::finish(Engine& engine, const FrameSource& source, const PipelineCounters& counters,
                         BlockArchive* archive) {
   report_.set_map(engine.map_health());
   if (archive) note_archive(*archive);
   if (files_) {
     if (record_.mesh) write_mesh(engine, archive);
+    if (map_saver_ && frames_seen_ > 0) save_map_at_end();
     if (const auto cloud = source.truth_cloud(); !cloud.empty() && truth_.anchored())
       tell(write_point_cloud(files_->folder.path("truth_cloud.ply"), in_map_frame(truth_, cloud)));
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -11,6 +12,7 @@
 #include "config/result.hpp"
 #include "kernels/engine.hpp"
 #include "runtime/archive/block_archive.hpp"
+#include "runtime/archive/map_saver.hpp"
 #include "runtime/pipeline/pipeline.hpp"
 #include "runtime/ports/frame_source.hpp"
 #include "runtime/record/events_log.hpp"
@@ -32,6 +34,10 @@ class RunOutputs {
   static Result<std::unique_ptr<RunOutputs>> create(const std::string& dir, const Config& config,
                                                     const SourceInfo& source, int64_t frames, Report report);
 
+  /// Where record.map asks for it: takes the memory for saving the map. @param engine outlives this
+  /// @thread boot
+  void prepare_map(const Engine& engine);
+
   /// After each processed frame, while the engine still holds it.
   void add(const RgbdFrame& frame, const FrameResult& result, Engine& engine);
   /// A frame that was passed over.
@@ -49,6 +55,9 @@ class RunOutputs {
   const Report& report() const { return report_; }
   double mesh_seconds() const { return mesh_seconds_; }
   uint64_t mesh_triangles() const { return mesh_triangles_; }
+  /// Of map.smap; 0: it was not asked for, or could not be written.
+  uint64_t map_bytes() const { return map_bytes_; }
+  double map_seconds() const { return map_seconds_; }
 
  private:
   struct Files {
@@ -69,6 +78,9 @@ class RunOutputs {
   bool snapshot_due();
   void write_mesh(Engine& engine, BlockArchive* archive);
   void note_archive(const BlockArchive& archive);
+  void save_map_on_the_way(const FrameResult& result);
+  void note_map_save();
+  void save_map_at_end();
 
   RecordConfig record_;
   Config config_;
@@ -88,6 +100,12 @@ class RunOutputs {
   FrameResult last_;
   double mesh_seconds_ = 0;
   uint64_t mesh_triangles_ = 0;
+  std::unique_ptr<MapSaver> map_saver_;  ///< null: no map is saved
+  std::optional<Stamp> map_save_due_;
+  std::chrono::steady_clock::time_point map_progress_due_;
+  bool map_saving_ = false;  ///< a save began whose end was not noted yet
+  uint64_t map_bytes_ = 0;
+  double map_seconds_ = 0;
 };
 
 }  // namespace stillmap

@@ -125,10 +125,8 @@ class Usage(Case):
     def test_parts_that_are_not_built_say_so(self):
         for arguments in [["run", "--source", SMALL, "--device", "cuda"],
                           ["run", "--source", SMALL, "--lcm", "udpm://239.255.76.67:7667?ttl=0"],
-                          ["run", "--source", SMALL, "--map", "a.smap"],
                           ["run", "--source", SMALL, "--realtime"],
                           ["run", "--source", SMALL, "--set", "record.log=true"],
-                          ["run", "--source", SMALL, "--set", "record.map=true"],
                           ["run", "--source", "xtion"],
                           ["mesh", "a.smap", "--out", "b.ply"], ["replay", "a.lcm"], ["top"], ["doctor"],
                           ["bench", "soak"]]:
@@ -333,6 +331,129 @@ class Outputs(Case):
         done = stillmap("run", "--source", SMALL, "--max-frames", "3", *LITTLE, cwd=self.folder)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(list(self.folder.iterdir()), [])
+
+
+class SavedMaps(Case):
+    SCENE = "synthetic:static,size=160x120,seconds=4"
+    MAP = ["--set", "map.pool_blocks=20000", "--set", "map.voxel_m=0.02", "--set", "record.snapshots=0"]
+
+    def run_map(self, out, source, *arguments):
+        done = stillmap("run", "--source", source, *self.MAP, "--out", out, *arguments)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        return done
+
+    def clip(self, name, times):
+        """A folder that shows frames of the rendered scene one after the other: (first, last) again and again."""
+        scene, folder = self.folder / "scene", self.folder / name
+        if not scene.exists():
+            done = stillmap("render", "--source", self.SCENE, "--out", scene)
+            self.assertEqual(done.returncode, 0, done.stderr)
+        folder.mkdir()
+        for part in ["rgb", "depth"]:
+            (folder / part).symlink_to(scene / part)
+        shutil.copy(scene / "camera.toml", folder)
+        lines = [line.split() for line in (scene / "associated.txt").read_text().splitlines() if not line.startswith("#")]
+        with open(folder / "associated.txt", "w") as file:
+            for turn, (first, last) in enumerate(times):
+                for a, one, b, other in lines[first:last]:
+                    file.write(f"{float(a) + 100 * turn:.6f} {one} {float(b) + 100 * turn:.6f} {other}\n")
+        return f"tum:{folder}"
+
+    def near(self, truth, mesh):
+        """Share of the vertices of one mesh within 4 mm (a step of the curve) of the surface of the other."""
+        curve = self.folder / "curve.csv"
+        done = stillmap("evaluate", "model", "--truth", truth, "--mesh", mesh, "--csv", curve)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return next(float(row[1]) for row in read_csv(curve)[1:] if abs(float(row[0]) - 0.004) < 1e-9)
+
+    def test_going_on_gives_the_mesh_of_one_uninterrupted_run(self):
+        half, whole, both = (self.clip(name, times) for name, times in
+                             [("half", [(0, 60)]), ("whole", [(0, 120)]), ("both", [(0, 60), (0, 120)])])
+        begun, gone_on, one_run = (self.folder / name for name in ["begun", "gone_on", "one_run"])
+        done = self.run_map(begun, half, "--set", "record.map=true")
+        self.assertIn("map.smap", done.stdout)
+        self.assertEqual(list(begun.glob("*.part")), [])
+        self.assertIn("map_save", (begun / "events.log").read_text())
+        self.run_map(gone_on, whole, "--map", begun / "map.smap", "--set", "record.map=true")
+        self.assertIn("map_load", (gone_on / "events.log").read_text())
+        self.run_map(one_run, both)
+
+        states = [row[1] for row in read_csv(gone_on / "states.csv")[1:]]
+        self.assertEqual(len(states), 120)
+        self.assertEqual(states[0], "lost")  # it looks before it maps
+        self.assertLess(states.index("good"), 30, "it took more than a second to find the camera")
+        self.assertNotIn("lost", states[30:])
+        report = json.loads((gone_on / "report.json").read_text())
+        self.assertEqual((report["relocalised"], report["heap_allocations_in_loop"]), (1, 0))
+        self.assertGreater(self.near(one_run / "mesh.ply", gone_on / "mesh.ply"), 0.99)
+        self.assertGreater(self.near(gone_on / "mesh.ply", one_run / "mesh.ply"), 0.99)
+
+        # In the same folder: the map is read before the earlier run is moved away.
+        self.run_map(gone_on, whole, "--map", gone_on / "map.smap", "--max-frames", "20")
+        # A map frame of its own: the poses are those of the map, not of the first frame.
+        self.run_map(gone_on, self.clip("later", [(40, 70)]), "--map", begun / "map.smap")
+        later = read_trajectory(gone_on / "trajectory.txt")
+        for a, b in zip(later[15:20], read_trajectory(begun / "trajectory.txt")[55:60]):
+            self.assertLess(math.dist(a[1:4], b[1:4]), 0.01)
+
+    def test_where_the_map_is_not_known_the_camera_stays_lost(self):
+        self.run_map(self.out, self.SCENE, "--max-frames", "20", "--set", "record.map=true")
+        done = stillmap("run", "--source", "synthetic:loop,size=160x120,seconds=1", *self.MAP, "--map",
+                        self.out / "map.smap", "--out", self.folder / "lost", "--max-frames", "15")
+        self.assertEqual(done.returncode, 4, done.stdout + done.stderr)
+        self.assertEqual({row[1] for row in read_csv(self.folder / "lost/states.csv")[1:]}, {"lost"})
+
+    def test_what_cannot_be_gone_on_with_is_refused(self):
+        self.mapped("--source", SMALL, "--max-frames", "5", "--out", self.out, "--set", "record.map=true")
+        whole = (self.out / "map.smap").read_bytes()
+        flipped = bytearray(whole)
+        flipped[len(whole) // 2] ^= 4
+        tried = self.folder / "tried.smap"
+        run = ["run", "--source", SMALL, *LITTLE, "--max-frames", "3", "--out", self.folder / "none", "--map"]
+        for code, content, says in [(1, whole[:-1], "cut off"), (1, whole[: len(whole) // 3], "cut off"),
+                                    (1, bytes(flipped), "damaged"), (1, whole + b"x", "damaged"), (1, b"", "cut off"),
+                                    (2, b"some other file of sixteen bytes and more", "not a map")]:
+            tried.write_bytes(content)
+            self.refused(code, *run, tried, says=[str(tried), says])
+        self.refused(2, *run, self.folder / "missing.smap", says=["missing.smap"])
+        self.refused(2, *run, self.out / "map.smap", "--set", "map.voxel_m=0.02",
+                     says=["map.voxel_m is 0.03 in the map and 0.02 in the configuration"])
+        self.refused(2, *run, self.out / "map.smap", "--set", "map.pool_blocks=5", says=["map.pool_blocks is 5"])
+        self.assertFalse((self.folder / "none").exists(), "nothing may be made for a map that is refused")
+        tried.write_bytes(whole)
+        self.mapped("--source", SMALL, "--max-frames", "5", "--map", tried)
+
+    def test_disk_that_is_too_small_for_the_map(self):
+        def limit():
+            resource.setrlimit(resource.RLIMIT_FSIZE, (100000, 100000))
+
+        done = stillmap("run", "--source", SMALL, *self.MAP, "--set", "record.map=true", "--set", "record.mesh=false",
+                        "--out", self.out, preexec_fn=limit)
+        self.assertEqual(done.returncode, 1, done.stdout + done.stderr)
+        self.assertEqual(done.stderr.count(f"{self.out}/map.smap: cannot be written: File too large"), 1, done.stderr)
+        self.assertEqual(list(self.out.glob("map.smap*")), [])
+
+    def test_kill_during_a_save_leaves_the_last_good_map(self):
+        during = 0
+        for attempt in range(6):
+            out = self.folder / f"killed-{attempt}"
+            run = subprocess.Popen([str(PROGRAM), "run", "--source", "synthetic:crowd,size=160x120,seconds=10000",
+                                    *self.MAP, "--set", "record.map=true", "--set", "record.map_every_s=0.1", "--quiet",
+                                    "--out", out])
+            self.addCleanup(run.kill)
+            deadline = time.monotonic() + 60
+            while not (out / "map.smap").exists() and time.monotonic() < deadline:
+                time.sleep(0.01)
+            while not (out / "map.smap.part").exists() and time.monotonic() < deadline:
+                time.sleep(0.0005)
+            time.sleep(0.002 * attempt)
+            run.kill()
+            self.assertEqual(run.wait(timeout=60), -signal.SIGKILL)
+            during += (out / "map.smap.part").exists()
+            done = stillmap("run", "--source", "synthetic:crowd,size=160x120,seconds=1", *self.MAP, "--max-frames", "10",
+                            "--map", out / "map.smap")
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        self.assertGreater(during, 0, "no kill fell into a save")
 
 
 class Trouble(Case):

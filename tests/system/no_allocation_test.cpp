@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
@@ -16,9 +17,11 @@
 #include "config/engine_params.hpp"
 #include "drivers/registry.hpp"
 #include "runtime/archive/block_archive.hpp"
+#include "runtime/archive/map_saver.hpp"
 #include "runtime/core/heap_guard.hpp"
 #include "runtime/pipeline/pipeline.hpp"
 #include "tests/support/frame_memory.hpp"
+#include "tests/support/temp_dir.hpp"
 
 extern "C" {
 void* __libc_malloc(size_t);
@@ -99,6 +102,15 @@ class RealTimeLoop : public testing::Test {
     pipeline_.emplace(*engine_, config);
   }
   void next() { ASSERT_EQ(source_->next(memory_->frame, 1000), Status::ok) << source_->error(); }
+  /// As the loop does: one save after the other.
+  void save(const Config& config, const std::string& path) {
+    if (!saver_) saver_.emplace(path, *engine_);
+    const MapInfo info = MapInfo::of(config, {}, Stamp{1});
+    allocations_ += allocations_of([&] {
+      saves_ += saver_->begin(info);
+      saver_->step();
+    });
+  }
   void process() {
     allocations_ += allocations_of([&] { pipeline_->process(memory_->frame); });
   }
@@ -107,7 +119,8 @@ class RealTimeLoop : public testing::Test {
   std::unique_ptr<Engine> engine_;
   std::optional<test::FrameMemory> memory_;
   std::optional<Pipeline> pipeline_;
-  uint64_t allocations_ = 0;
+  std::optional<MapSaver> saver_;  // the engine outlives it
+  uint64_t allocations_ = 0, saves_ = 0;
 };
 
 TEST_F(RealTimeLoop, DoesNotAllocateIn300FramesWorkersIncluded) {
@@ -149,6 +162,29 @@ TEST_F(RealTimeLoop, DoesNotAllocateWhileTheArchiveRuns) {
   EXPECT_EQ((*archive)->counters().failed, 0u);
   archive->reset();
   std::filesystem::remove_all(options.dir);
+}
+
+TEST_F(RealTimeLoop, DoesNotAllocateWhileTheMapIsSaved) {
+  const test::TempDir dir;
+  Config config;
+  config.map.pool_blocks = 20000;
+  config.map.voxel_m = 0.04f;
+  config.map.truncation_m = 0.16f;
+  ASSERT_NO_FATAL_FAILURE(start(config, "synthetic:crowd,size=160x120,seconds=3"));
+  for (int i = 0; i < 80; ++i) {
+    ASSERT_NO_FATAL_FAILURE(next());
+    process();
+    save(config, dir.path("map.smap"));
+  }
+  EXPECT_EQ(allocations_, 0u);
+  EXPECT_GE(saves_, 1u);
+  while (saver_->progress().saving)
+    if (!saver_->step()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  EXPECT_EQ(saver_->result().error, "");
+  saver_.reset();
+  const auto file = MapFile::open(dir.path("map.smap"));
+  ASSERT_TRUE(file) << file.error();
+  EXPECT_GT(file->contents().voxel_blocks, 100u);
 }
 
 TEST_F(RealTimeLoop, DoesNotAllocateWhileLostAndFindingItselfAgain) {
