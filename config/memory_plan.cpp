@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <bit>
 
 #include "config/engine_params.hpp"
 #include "kernels/base/view.hpp"
@@ -15,12 +13,6 @@ constexpr uint64_t kBytesPerMb = 1000000;
 
 double megabytes(uint64_t bytes) {
   return static_cast<double>(bytes) / static_cast<double>(kBytesPerMb);
-}
-
-/// Slots of the engine's table (Engine::group_capacity).
-uint64_t most_groups(const MapParams& map) {
-  constexpr uint64_t kFewest = 16;
-  return std::bit_ceil(std::max(static_cast<uint64_t>(map.pool_blocks), kFewest));
 }
 
 }  // namespace
@@ -37,7 +29,6 @@ MemoryPlan memory_plan(const Config& config, const CameraModel& camera, const Me
   plan.add("frame slots: depth", kFrameSlots * pixels * sizeof(uint16_t));
   plan.add("frame slots: colour", kFrameSlots * pixels * sizeof(Rgb8));
   plan.add("frame slots: true mask", kFrameSlots * pixels * sizeof(uint8_t));
-  if (config.record.map) plan.add("map on its way to disk", map_save_bytes(most_groups(config.map)));
   plan.budget_bytes = static_cast<uint64_t>(config.memory.budget_mb) * kBytesPerMb;
   return plan;
 }

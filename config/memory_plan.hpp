@@ -7,7 +7,6 @@
 #include "config/config.hpp"
 #include "config/result.hpp"
 #include "kernels/engine.hpp"
-#include "kernels/map/group_record.hpp"
 
 namespace stillmap {
 
@@ -28,16 +27,6 @@ struct MemoryPlan {
 
 /// Frames that the runtime holds: one being filled, one being processed.
 inline constexpr uint64_t kFrameSlots = 2;
-
-/// Pieces of a map that is being saved, between the loop and the thread that writes.
-inline constexpr uint32_t kMapSaveChunks = 4;
-/// A piece is full when it holds as much; also what a frame copies at most, but for one more group.
-inline constexpr uint32_t kMapSaveChunkBytes = 512 * 1024;
-/// What saving takes, a largest group over the size of a piece included. @param groups Engine::group_capacity
-constexpr uint64_t map_save_bytes(uint64_t groups) {
-  constexpr uint64_t kLargestRecord = kMaxGroupRecordBytes + sizeof(uint32_t);
-  return kMapSaveChunks * (kMapSaveChunkBytes + kLargestRecord) + groups * sizeof(BlockKey);
-}
 
 /// The engine's pools as `plan_cpu_engine` counts them, the frame slots, and memory.budget_mb (10^6 bytes
 /// each).

@@ -222,6 +222,8 @@ class Engine {
 
 /// What make_cpu_engine would take, item by item. Same code as the one that carves, so it cannot differ.
 MemoryItems plan_cpu_engine(const EngineParams& params);
+/// Engine::group_capacity of what make_cpu_engine would make.
+uint32_t plan_group_capacity(const EngineParams& params);
 
 /// Allocates everything, starts the workers.
 /// @return null when the memory cannot be had.  @thread boot

@@ -6,6 +6,7 @@
 #include "config/validate.hpp"
 #include "firmware-like/commands/command.hpp"
 #include "firmware-like/commands/stop_signal.hpp"
+#include "runtime/archive/map_saver.hpp"
 
 namespace stillmap {
 
@@ -88,6 +89,8 @@ MemoryPlan plan_memory(const Config& config, const EngineParams& params) {
   MemoryPlan plan = memory_plan(config, params.camera, params.depth_units_per_m);
   if (!config.archive.dir.empty())
     plan.add("archive: groups on their way", BlockArchive::planned_bytes(archive_options(config)));
+  if (config.record.map)
+    plan.add("map on its way to disk", MapSaver::planned_bytes(plan_group_capacity(params)));
   return plan;
 }
 

@@ -12,7 +12,6 @@
 #include <cstdint>
 #include <type_traits>
 
-#include "config/memory_plan.hpp"
 #include "kernels/base/se3.hpp"
 #include "kernels/map/group_record.hpp"
 #include "kernels/relocalise/place_record.hpp"
@@ -39,11 +38,12 @@ struct ChunkHead {
 };
 static_assert(sizeof(ChunkHead) == 12);
 
-/// A chunk is closed when it holds kMapSaveChunkBytes; the record that closes it goes over that.
+/// A chunk is closed when it holds as much; the record that closes it goes over that.
+inline constexpr uint32_t kChunkBytes = 512 * 1024;
 inline constexpr uint32_t kMaxRecordBytes =
     kMaxGroupRecordBytes > kMaxPlaceRecordBytes ? kMaxGroupRecordBytes : kMaxPlaceRecordBytes;
 inline constexpr uint32_t kMaxChunkBytes =
-    kMapSaveChunkBytes + kMaxRecordBytes + static_cast<uint32_t>(sizeof(uint32_t));
+    kChunkBytes + kMaxRecordBytes + static_cast<uint32_t>(sizeof(uint32_t));
 
 struct InfoRecord {
   Se3d T_map_cam;    ///< pose to continue from

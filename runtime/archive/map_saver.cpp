@@ -39,6 +39,10 @@ MapSaver::~MapSaver() {
   ::sem_destroy(&work_);
 }
 
+uint64_t MapSaver::planned_bytes(uint32_t groups) {
+  return uint64_t{kPieces} * kMaxChunkBytes + groups * sizeof(uint64_t);
+}
+
 uint64_t MapSaver::memory_bytes() const {
   return pieces_.size() * pieces_[0].data.size() + keys_.size() * sizeof(uint64_t);
 }
@@ -52,7 +56,7 @@ bool MapSaver::begin(const MapInfo& info) {
   all_copied_ = false;
   failed_ = false;
   saving_ = true;
-  Piece& piece = pieces_[filled_ % kMapSaveChunks];
+  Piece& piece = pieces_[filled_ % kPieces];
   piece.kind = ChunkKind::info;
   std::memcpy(piece.data.data(), &info, sizeof info);
   hand_over();
@@ -65,8 +69,8 @@ SaveProgress MapSaver::progress() const {
 
 bool MapSaver::step() {
   if (all_copied_) return false;
-  if (filled_ - written_.load(std::memory_order_acquire) == kMapSaveChunks) return false;
-  Piece& piece = pieces_[filled_ % kMapSaveChunks];
+  if (filled_ - written_.load(std::memory_order_acquire) == kPieces) return false;
+  Piece& piece = pieces_[filled_ % kPieces];
   piece.records = piece.bytes = 0;
   fill(piece);
   hand_over();
@@ -91,7 +95,7 @@ void MapSaver::fill(Piece& piece) {
 /// @param write puts a record into a view and answers its length. @return false when the piece is full
 template <class Write>
 bool MapSaver::append(Piece& piece, Write&& write) {
-  if (piece.bytes >= kMapSaveChunkBytes) return false;
+  if (piece.bytes >= kChunkBytes) return false;
   uint8_t* const at = piece.data.data() + piece.bytes;
   const uint32_t length = write(View<uint8_t>{at + kLengthBytes, kMaxRecordBytes});
   if (length == 0) return true;  // it is gone
@@ -120,7 +124,7 @@ void MapSaver::write_pieces() {
     while (::sem_wait(&work_) != 0 && errno == EINTR) {
     }
     if (stop_) return;
-    write(pieces_[written_ % kMapSaveChunks]);
+    write(pieces_[written_ % kPieces]);
     written_.fetch_add(1, std::memory_order_release);
   }
 }

@@ -38,7 +38,7 @@ struct SaveResult {
 /// waits.
 class MapSaver {
  public:
-  /// Takes all the memory (map_save_bytes) and starts the thread. @param engine outlives this
+  /// Takes all the memory (planned_bytes) and starts the thread. @param engine outlives this
   MapSaver(std::string path, const Engine& engine);
   /// A save that is not finished is given up; the file that was there stays.
   ~MapSaver();
@@ -55,8 +55,12 @@ class MapSaver {
   const SaveResult& result() const { return result_; }
   const std::string& path() const { return path_; }
   uint64_t memory_bytes() const;
+  /// For the plan. @param groups Engine::group_capacity
+  static uint64_t planned_bytes(uint32_t groups);
 
  private:
+  /// On their way to the thread.
+  static constexpr uint32_t kPieces = 4;
   /// A piece on its way. Owned by the loop, and by the thread between `filled_` and `written_`.
   struct Piece {
     ChunkKind kind = ChunkKind::info;
@@ -79,7 +83,7 @@ class MapSaver {
 
   const std::string path_;
   const Engine& engine_;
-  std::array<Piece, kMapSaveChunks> pieces_;
+  std::array<Piece, kPieces> pieces_;
   std::atomic<uint64_t> filled_ = 0, written_ = 0;  ///< pieces, ever
   std::atomic<bool> saving_ = false, failed_ = false, stop_ = false;
   sem_t work_;

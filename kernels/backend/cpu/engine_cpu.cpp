@@ -695,6 +695,13 @@ MemoryItems plan_cpu_engine(const EngineParams& params) {
   return arena.items();
 }
 
+uint32_t plan_group_capacity(const EngineParams& params) {
+  Arena arena;
+  CpuMemory memory;
+  memory.carve(arena, params);
+  return memory.map.view().table.keys.size;
+}
+
 std::unique_ptr<Engine> make_cpu_engine(const EngineParams& params) {
   return make_cpu_engine(params, best_loops());
 }
