@@ -127,9 +127,15 @@ int run(const RunOptions& o, FrameObserver* observer) {
                     memory.total_bytes / 1000000),
         ErrorKind::failed);
 
+  std::unique_ptr<BlockArchive> archive;
+  if (!config.archive.dir.empty()) {
+    auto made = BlockArchive::open(archive_options(config));
+    if (!made) return fail(made.error(), ErrorKind::failed);
+    archive = std::move(*made);
+  }
   std::string loaded_text;
   if (MapFile* const file = map->has_value() ? &**map : nullptr) {
-    const auto loaded = file->load(*engine);
+    const auto loaded = file->load(*engine, archive.get());
     if (!loaded) return fail("--map " + loaded.error(), loaded.error_kind());
     loaded_text = map_text(o.map, *file, *loaded);
   }
@@ -142,14 +148,8 @@ int run(const RunOptions& o, FrameObserver* observer) {
   if (!outputs) return fail(outputs.error(), ErrorKind::failed);
   (*outputs)->event(Stamp{}, "start", fmt::format("{}, cpu engine, {} threads", info.name, params.threads));
 
-  std::unique_ptr<BlockArchive> archive;
-  if (!config.archive.dir.empty()) {
-    auto made = BlockArchive::open(archive_options(config));
-    if (!made) return fail(made.error(), ErrorKind::failed);
-    archive = std::move(*made);
-  }
   if (!loaded_text.empty()) (*outputs)->event(Stamp{}, "map_load", loaded_text);
-  (*outputs)->prepare_map(*engine);
+  (*outputs)->prepare_map(*engine, archive.get());
 
   if (observer) observer->begin(source, info);
   FrameSlot slot(info);

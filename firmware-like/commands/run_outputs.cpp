@@ -208,8 +208,9 @@ void RunOutputs::note_archive(const BlockArchive& archive) {
   if (c.failed > 0) events_.fault(last_stamp_, "archive_failed", archive.last_error());
 }
 
-void RunOutputs::prepare_map(const Engine& engine) {
-  if (record_.map && files_) map_saver_ = std::make_unique<MapSaver>(files_->folder.path("map.smap"), engine);
+void RunOutputs::prepare_map(const Engine& engine, const BlockArchive* archive) {
+  if (record_.map && files_)
+    map_saver_ = std::make_unique<MapSaver>(files_->folder.path("map.smap"), engine, archive);
 }
 
 void RunOutputs::save_map_on_the_way(const FrameResult& result) {

@@ -36,7 +36,7 @@ class RunOutputs {
 
   /// Where record.map asks for it: takes the memory for saving the map. @param engine outlives this
   /// @thread boot
-  void prepare_map(const Engine& engine);
+  void prepare_map(const Engine& engine, const BlockArchive* archive);
 
   /// After each processed frame, while the engine still holds it.
   void add(const RgbdFrame& frame, const FrameResult& result, Engine& engine);

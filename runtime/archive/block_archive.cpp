@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -70,6 +71,13 @@ bool read_all(const File& file, uint8_t* bytes, size_t count) {
     count -= static_cast<size_t>(done);
   }
   return true;
+}
+
+/// @return false: cut, or not what was written
+bool read_record(const File& file, uint8_t* record, uint32_t bytes) {
+  uint64_t sum = 0;
+  return read_all(file, record, bytes) && read_all(file, reinterpret_cast<uint8_t*>(&sum), sizeof sum) &&
+         sum == checksum(record, bytes);
 }
 
 /// A folder that no other run uses.
@@ -276,13 +284,9 @@ bool BlockArchive::write(const Slot& slot) {
 bool BlockArchive::read(Slot& slot) {
   Path name;
   path(slot.key, name);
-  uint64_t sum = 0;
   const File file(::open(name.text, O_RDONLY | O_CLOEXEC));
   errno = 0;
-  if (file.is_open() && read_all(file, slot.record.data(), slot.bytes) &&
-      read_all(file, reinterpret_cast<uint8_t*>(&sum), sizeof sum) &&
-      sum == checksum(slot.record.data(), slot.bytes))
-    return true;
+  if (file.is_open() && read_record(file, slot.record.data(), slot.bytes)) return true;
   note_error(name, "is gone or not what was written; this part of the map is lost", errno);
   return false;
 }
@@ -304,13 +308,50 @@ std::string BlockArchive::last_error() const {
   return error_;
 }
 
-std::string BlockArchive::for_each(Engine& engine, const std::function<bool(View<const uint8_t> record)>& f) {
+uint32_t BlockArchive::list(View<uint64_t> keys) const {
+  uint32_t count = 0;
+  for (const Entry& entry : entries_)
+    if (count < keys.size && (entry.state == EntryState::stored || entry.state == EntryState::loading))
+      keys[count++] = entry.key;
+  return count;
+}
+
+uint32_t BlockArchive::copy(uint64_t key, View<uint8_t> record) const {
+  Path name;
+  path(key, name);
+  const File file(::open(name.text, O_RDONLY | O_CLOEXEC));
+  struct stat about = {};
+  if (!file.is_open() || ::fstat(file.descriptor(), &about) != 0) return 0;
+  const int64_t bytes = about.st_size - static_cast<int64_t>(sizeof(uint64_t));
+  if (bytes <= 0 || bytes > static_cast<int64_t>(record.size)) return 0;
+  const auto count = static_cast<uint32_t>(bytes);
+  return read_record(file, record.data, count) ? count : 0;
+}
+
+std::string BlockArchive::make_room(Engine& engine, Vec3 centre_map) {
+  for (uint64_t before = ~uint64_t{0}; engine.map_health().fill > options_.keep_below;) {
+    if (counters_.stored == before) return {};
+    before = counters_.stored;
+    far_left_ = 0;  // the map has grown since
+    put_away_far(engine, centre_map);
+    if (std::string error = settle(engine); !error.empty()) return error;
+  }
+  return {};
+}
+
+/// Waits until what is on its way has arrived.
+std::string BlockArchive::settle(Engine& engine) {
   uint32_t number = 0;
   while (free_slots_.size() < slots_.size()) {
     if (!answers_.pop_within(number, kLongestAnswer))
       return fmt::format("{}: the disk did not answer within {} s", folder_, kLongestAnswer.count() / 1000);
     take_answer(engine, number);
   }
+  return {};
+}
+
+std::string BlockArchive::for_each(Engine& engine, const std::function<bool(View<const uint8_t> record)>& f) {
+  if (std::string error = settle(engine); !error.empty()) return error;
   Slot slot;
   slot.record.resize(kMaxGroupRecordBytes);
   for (const Entry& entry : entries_) {

@@ -55,7 +55,15 @@ class BlockArchive {
   /// files
   void step(Engine& engine, Vec3 centre_map);
 
+  /// Boot: puts away until the map is below `keep_below`, or nothing more goes.
+  /// @return what went wrong, else nothing.  @thread the engine's caller; waits
+  std::string make_room(Engine& engine, Vec3 centre_map);
+
   const ArchiveCounters& counters() const { return counters_; }
+  /// Keys of what is on disk, as many as fit. @return how many.  @thread the engine's caller
+  uint32_t list(View<uint64_t> keys) const;
+  /// @return bytes of the record; 0: it is not there just now, or does not fit.  @thread any; reads a file
+  uint32_t copy(uint64_t key, View<uint8_t> record) const;
   /// The last failure: which file, and why; empty when there was none. @thread the engine's caller
   std::string last_error() const;
 
@@ -83,6 +91,7 @@ class BlockArchive {
 
   BlockArchive(const Options& options, std::string folder);
 
+  std::string settle(Engine& engine);
   void take_answer(Engine& engine, uint32_t number);
   void stored(Engine& engine, const Slot& slot);
   bool loaded(Engine& engine, const Slot& slot);

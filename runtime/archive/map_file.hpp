@@ -11,6 +11,7 @@
 #include "config/config.hpp"
 #include "config/result.hpp"
 #include "kernels/engine.hpp"
+#include "runtime/archive/block_archive.hpp"
 #include "runtime/archive/map_format.hpp"
 #include "runtime/ports/frame_source.hpp"
 #include "runtime/record/output_file.hpp"
@@ -107,7 +108,9 @@ class MapFile {
   /// under this configuration
   Result<Done> check_against(const Config& config) const;
   /// Puts the map in place of the engine's. On an error the engine's map is empty.
-  Result<LoadedMap> load(Engine& engine);
+  /// @param archive takes what is farthest from the pose to continue from where the pool is too small; may be
+  /// null
+  Result<LoadedMap> load(Engine& engine, BlockArchive* archive = nullptr);
 
  private:
   /// One chunk, unpacked; its bytes live until the next one is read.
@@ -125,7 +128,8 @@ class MapFile {
   Result<Done> check_record(const Chunk& chunk, View<const uint8_t> record);
   Result<Done> check_end(const Chunk& chunk);
   Result<Done> verify();
-  Result<Done> put(const Chunk& chunk, View<const uint8_t> record, Engine& engine, LoadedMap& loaded);
+  Result<Done> put(const Chunk& chunk, View<const uint8_t> record, Engine& engine, BlockArchive* archive,
+                   LoadedMap& loaded);
   template <class See>
   Result<Done> each_record(const Chunk& chunk, See&& see);
   template <class See>

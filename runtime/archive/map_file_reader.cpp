@@ -234,20 +234,27 @@ Result<Done> MapFile::check_against(const Config& config) const {
     differs("map.truncation_m", float_text(info_.truncation_m), float_text(map.truncation_m));
   if (contents_.partly_blocks > 0 && map.free_space == FreeSpace::dense)
     differs("map.free_space", name_of(info_.free_space), name_of(map.free_space));
-  if (contents_.voxel_blocks > static_cast<uint64_t>(map.pool_blocks))
-    problems += fmt::format("\n  it has {} blocks and map.pool_blocks is {}: use --set map.pool_blocks={}",
-                            contents_.voxel_blocks, map.pool_blocks,
-                            contents_.voxel_blocks + contents_.voxel_blocks / 2);
+  if (config.archive.dir.empty() && contents_.voxel_blocks > static_cast<uint64_t>(map.pool_blocks))
+    problems += fmt::format(
+        "\n  it has {} blocks and map.pool_blocks is {}: use --set map.pool_blocks={}, or --set "
+        "archive.dir=FOLDER",
+        contents_.voxel_blocks, map.pool_blocks, contents_.voxel_blocks + contents_.voxel_blocks / 2);
   if (problems.empty()) return Done{};
   return Error{fmt::format("{}: the map cannot be gone on with:{}\n  or leave --map out", path_, problems),
                ErrorKind::bad_usage};
 }
 
-Result<Done> MapFile::put(const Chunk& chunk, View<const uint8_t> record, Engine& engine, LoadedMap& loaded) {
+Result<Done> MapFile::put(const Chunk& chunk, View<const uint8_t> record, Engine& engine,
+                          BlockArchive* archive, LoadedMap& loaded) {
   if (chunk.kind == ChunkKind::groups) {
+    if (archive)
+      if (const std::string error = archive->make_room(engine, cast<float>(info_.T_map_cam).translation);
+          !error.empty())
+        return Error{path_ + ": " + error};
     const Status status = engine.read_group(record);
     if (status == Status::capacity_exhausted)
-      return Error{path_ + ": the map does not fit; make map.pool_blocks larger", ErrorKind::bad_usage};
+      return Error{path_ + ": the map does not fit; make map.pool_blocks or archive.max_bytes larger",
+                   ErrorKind::bad_usage};
     if (status != Status::ok) return damaged("a group that the engine refuses");
     return Done{};
   }
@@ -257,12 +264,13 @@ Result<Done> MapFile::put(const Chunk& chunk, View<const uint8_t> record, Engine
   return Done{};
 }
 
-Result<LoadedMap> MapFile::load(Engine& engine) {
+Result<LoadedMap> MapFile::load(Engine& engine, BlockArchive* archive) {
   engine.reset_map();
   LoadedMap loaded;
   const auto good = each_chunk([&](const Chunk& chunk) -> Result<Done> {
     if (chunk.kind == ChunkKind::end) return Done{};
-    return each_record(chunk, [&](View<const uint8_t> record) { return put(chunk, record, engine, loaded); });
+    return each_record(
+        chunk, [&](View<const uint8_t> record) { return put(chunk, record, engine, archive, loaded); });
   });
   if (good) return loaded;
   engine.reset_map();

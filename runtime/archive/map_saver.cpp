@@ -15,6 +15,8 @@ namespace stillmap {
 namespace {
 
 constexpr uint32_t kLengthBytes = sizeof(uint32_t);
+constexpr uint32_t kLooksAtOnce = 4096;  ///< for groups in the map, in one step
+constexpr uint32_t kKeysAtOnce = 64;     ///< that the thread reads from the archive as one piece
 
 /// Nobody waits for a save: whoever else wants the processor goes first, and it may allocate.
 void step_back() {
@@ -25,8 +27,12 @@ void step_back() {
 
 }  // namespace
 
-MapSaver::MapSaver(std::string path, const Engine& engine)
-    : path_(std::move(path)), engine_(engine), keys_(engine.group_capacity()) {
+MapSaver::MapSaver(std::string path, const Engine& engine, const BlockArchive* archive)
+    : path_(std::move(path)),
+      engine_(engine),
+      archive_(archive),
+      keys_(engine.group_capacity()),
+      record_(kLengthBytes + kMaxRecordBytes) {
   ::sem_init(&work_, 0, 0);
   for (Piece& piece : pieces_) piece.data.resize(kMaxChunkBytes);
   thread_ = std::thread([this] { write_pieces(); });
@@ -40,39 +46,44 @@ MapSaver::~MapSaver() {
 }
 
 uint64_t MapSaver::planned_bytes(uint32_t groups) {
-  return uint64_t{kPieces} * kMaxChunkBytes + groups * sizeof(uint64_t);
+  return uint64_t{kPieces} * kMaxChunkBytes + groups * sizeof(uint64_t) + kLengthBytes + kMaxRecordBytes;
 }
 
 uint64_t MapSaver::memory_bytes() const {
-  return pieces_.size() * pieces_[0].data.size() + keys_.size() * sizeof(uint64_t);
+  return pieces_.size() * pieces_[0].data.size() + keys_.size() * sizeof(uint64_t) + record_.size();
 }
 
 bool MapSaver::begin(const MapInfo& info) {
   if (saving_.load(std::memory_order_acquire)) return false;
   began_ = Clock::now();
-  groups_ = std::min<uint64_t>(engine_.list_groups({keys_.data(), static_cast<uint32_t>(keys_.size())}),
-                               keys_.size());
-  next_group_ = next_place_ = 0;
+  const auto size = static_cast<uint32_t>(keys_.size());
+  uint32_t listed = std::min(engine_.list_groups({keys_.data(), size}), size);
+  if (archive_) listed += archive_->list({keys_.data() + listed, size - listed});
+  total_ = groups_ = listed;
+  next_group_ = kept_ = next_place_ = rounds_ = 0;
   all_copied_ = false;
   failed_ = false;
   saving_ = true;
   Piece& piece = pieces_[filled_ % kPieces];
   piece.kind = ChunkKind::info;
+  piece.archived = false;
   std::memcpy(piece.data.data(), &info, sizeof info);
   hand_over();
   return true;
 }
 
 SaveProgress MapSaver::progress() const {
-  return {saving_.load(std::memory_order_acquire), groups_, next_group_};
+  return {saving_.load(std::memory_order_acquire), total_, total_ - kept_ - (groups_ - next_group_)};
 }
 
 bool MapSaver::step() {
   if (all_copied_) return false;
-  if (filled_ - written_.load(std::memory_order_acquire) == kPieces) return false;
+  take_back();
+  if (filled_ - taken_back_ == kPieces || !start_round()) return false;
   Piece& piece = pieces_[filled_ % kPieces];
   piece.records = piece.bytes = 0;
-  fill(piece);
+  piece.archived = false;
+  if (!fill(piece)) return false;
   hand_over();
   return true;
 }
@@ -82,14 +93,39 @@ void MapSaver::hand_over() {
   ::sem_post(&work_);
 }
 
-void MapSaver::fill(Piece& piece) {
-  if (failed_.load(std::memory_order_relaxed)) next_group_ = groups_;
-  fill_groups(piece);
-  if (piece.records > 0) return;
+/// What was written; what the archive did not have is kept for the next round.
+void MapSaver::take_back() {
+  for (const uint64_t written = written_.load(std::memory_order_acquire); taken_back_ < written;
+       ++taken_back_) {
+    const Piece& piece = pieces_[taken_back_ % kPieces];
+    if (!piece.archived) continue;
+    std::memcpy(keys_.data() + kept_, piece.data.data(), piece.records * sizeof(uint64_t));
+    kept_ += piece.records;
+  }
+}
+
+/// Goes on with what was not found, when all of this round is through.
+/// @return false: the thread is not there yet
+bool MapSaver::start_round() {
+  if (next_group_ < groups_ || !archive_ || groups_ == 0) return true;
+  if (taken_back_ < filled_) return false;
+  const bool again = ++rounds_ < kMostRounds;
+  groups_ = again ? kept_ : 0;
+  next_group_ = kept_ = 0;
+  return true;
+}
+
+/// @return false: nothing to hand over yet
+bool MapSaver::fill(Piece& piece) {
+  if (failed_.load(std::memory_order_relaxed)) groups_ = next_group_ = kept_ = 0;
+  if (next_group_ < groups_) rounds_ % 2 == 0 ? fill_groups(piece) : fill_archived(piece);
+  if (piece.records > 0) return true;
+  if (next_group_ < groups_ || kept_ > 0) return false;
   fill_places(piece);
-  if (piece.records > 0) return;
+  if (piece.records > 0) return true;
   piece.kind = ChunkKind::end;
   all_copied_ = true;
+  return true;
 }
 
 /// @param write puts a record into a view and answers its length. @return false when the piece is full
@@ -107,8 +143,21 @@ bool MapSaver::append(Piece& piece, Write&& write) {
 
 void MapSaver::fill_groups(Piece& piece) {
   piece.kind = ChunkKind::groups;
-  const auto write = [&](View<uint8_t> record) { return engine_.write_group(keys_[next_group_], record); };
-  while (next_group_ < groups_ && append(piece, write)) ++next_group_;
+  const auto write = [&](View<uint8_t> record) {
+    const uint32_t bytes = engine_.write_group(keys_[next_group_], record);
+    if (bytes == 0 && archive_) keys_[kept_++] = keys_[next_group_];
+    return bytes;
+  };
+  for (uint32_t looks = 0; looks < kLooksAtOnce && next_group_ < groups_ && append(piece, write); ++looks)
+    ++next_group_;
+}
+
+void MapSaver::fill_archived(Piece& piece) {
+  piece.kind = ChunkKind::groups;
+  piece.archived = true;
+  piece.records = static_cast<uint32_t>(std::min<uint64_t>(groups_ - next_group_, kKeysAtOnce));
+  std::memcpy(piece.data.data(), keys_.data() + next_group_, piece.records * sizeof(uint64_t));
+  next_group_ += piece.records;
 }
 
 void MapSaver::fill_places(Piece& piece) {
@@ -129,7 +178,7 @@ void MapSaver::write_pieces() {
   }
 }
 
-void MapSaver::write(const Piece& piece) {
+void MapSaver::write(Piece& piece) {
   if (piece.kind == ChunkKind::info) {
     MapInfo info;
     std::memcpy(&info, piece.data.data(), sizeof info);
@@ -141,11 +190,30 @@ void MapSaver::write(const Piece& piece) {
       result_.error = writer.error();
   } else if (piece.kind == ChunkKind::end) {
     return finish();
-  } else if (writer_ && !writer_->write(piece.kind, {piece.data.data(), piece.bytes}, piece.records)) {
+  } else if (writer_ && !(piece.archived ? write_archived(piece)
+                                         : writer_->write(piece.kind, {piece.data.data(), piece.bytes},
+                                                          piece.records))) {
     result_.error = writer_->error();
     writer_.reset();
   }
   failed_ = !writer_;
+}
+
+bool MapSaver::write_archived(Piece& piece) {
+  uint32_t missing = 0;
+  for (uint32_t i = 0; i < piece.records; ++i) {
+    uint64_t key = 0;
+    std::memcpy(&key, piece.data.data() + i * sizeof key, sizeof key);
+    const uint32_t bytes = archive_->copy(key, {record_.data() + kLengthBytes, kMaxGroupRecordBytes});
+    if (bytes == 0) {
+      std::memcpy(piece.data.data() + missing++ * sizeof key, &key, sizeof key);
+      continue;
+    }
+    std::memcpy(record_.data(), &bytes, kLengthBytes);
+    if (!writer_->write(ChunkKind::groups, {record_.data(), kLengthBytes + bytes}, 1)) return false;
+  }
+  piece.records = missing;
+  return true;
 }
 
 void MapSaver::finish() {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "kernels/engine.hpp"
+#include "runtime/archive/block_archive.hpp"
 #include "runtime/archive/map_file.hpp"
 
 namespace stillmap {
@@ -33,13 +34,15 @@ struct SaveResult {
 /// Saves the map to a file while it is being worked on. The loop copies a bounded piece in each `step`; a
 /// thread packs and writes it. Pieces go through a ring of a few; while it is full a step copies nothing. A
 /// group that changes during the save is saved as it was before or after; one that comes up during it is left
-/// for the next.
+/// for the next. Groups in the archive are read there by the thread. Groups move between the map and the
+/// archive meanwhile: what was not found in one is looked for in the other.
 /// @thread begin, step, progress, result: the engine's caller; none of the first three allocates, locks or
 /// waits.
 class MapSaver {
  public:
-  /// Takes all the memory (planned_bytes) and starts the thread. @param engine outlives this
-  MapSaver(std::string path, const Engine& engine);
+  /// Takes all the memory (planned_bytes) and starts the thread. @param engine, archive (may be null)
+  /// outlive this
+  MapSaver(std::string path, const Engine& engine, const BlockArchive* archive = nullptr);
   /// A save that is not finished is given up; the file that was there stays.
   ~MapSaver();
   MapSaver(const MapSaver&) = delete;
@@ -61,9 +64,12 @@ class MapSaver {
  private:
   /// On their way to the thread.
   static constexpr uint32_t kPieces = 4;
+  /// Looks at the map and at the archive in turn for what was not found; then it is gone.
+  static constexpr uint32_t kMostRounds = 8;
   /// A piece on its way. Owned by the loop, and by the thread between `filled_` and `written_`.
   struct Piece {
     ChunkKind kind = ChunkKind::info;
+    bool archived = false;  ///< keys of groups in the archive; the thread leaves those that are not there
     uint32_t records = 0;
     uint32_t bytes = 0;
     std::vector<uint8_t> data;
@@ -72,31 +78,39 @@ class MapSaver {
 
   template <class Write>
   bool append(Piece& piece, Write&& write);
-  void fill(Piece& piece);
+  bool fill(Piece& piece);
+  bool start_round();
   void fill_groups(Piece& piece);
+  void fill_archived(Piece& piece);
   void fill_places(Piece& piece);
   void hand_over();
+  void take_back();
 
   void write_pieces();
-  void write(const Piece& piece);
+  void write(Piece& piece);
+  bool write_archived(Piece& piece);
   void finish();
 
   const std::string path_;
   const Engine& engine_;
+  const BlockArchive* const archive_;
   std::array<Piece, kPieces> pieces_;
   std::atomic<uint64_t> filled_ = 0, written_ = 0;  ///< pieces, ever
   std::atomic<bool> saving_ = false, failed_ = false, stop_ = false;
   sem_t work_;
 
   // The loop's.
-  std::vector<uint64_t> keys_;
-  uint64_t groups_ = 0, next_group_ = 0;
+  std::vector<uint64_t> keys_;  ///< of this round; those behind `next_group_` make room for the next round's
+  uint64_t groups_ = 0, next_group_ = 0, kept_ = 0, total_ = 0;
+  uint32_t rounds_ = 0;
+  uint64_t taken_back_ = 0;  ///< pieces, ever
   uint32_t next_place_ = 0;
   bool all_copied_ = true;
   Clock::time_point began_;
 
   // The thread's, and the loop's while nothing is being saved.
   std::optional<MapFileWriter> writer_;
+  std::vector<uint8_t> record_;  ///< from the archive
   SaveResult result_;
 
   std::thread thread_;

@@ -346,7 +346,7 @@ class SavedMaps(Case):
         """A folder that shows frames of the rendered scene one after the other: (first, last) again and again."""
         scene, folder = self.folder / "scene", self.folder / name
         if not scene.exists():
-            done = stillmap("render", "--source", self.SCENE, "--out", scene)
+            done = stillmap("render", "--source", self.SCENE.replace("160x120", "320x240"), "--out", scene)
             self.assertEqual(done.returncode, 0, done.stderr)
         folder.mkdir()
         for part in ["rgb", "depth"]:

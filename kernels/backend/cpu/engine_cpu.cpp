@@ -215,9 +215,9 @@ class CpuEngine final : public Engine {
     return memory_.map.write_group(key, record);
   }
   uint32_t farthest_groups(Vec3 centre_map, View<uint64_t> keys) override {
-    if (groups_looked_at_ == 0) return 0;  // nothing was integrated yet
-    return memory_.map.farthest_groups(centre_map, keys,
-                                       [&](BlockKey key) { return last_view_.comes_into_view(unpack(key)); });
+    const bool has_view = groups_looked_at_ > 0;  // something was integrated
+    return memory_.map.farthest_groups(
+        centre_map, keys, [&](BlockKey key) { return has_view && last_view_.comes_into_view(unpack(key)); });
   }
   void put_away(uint64_t key, uint32_t entry) override { memory_.map.put_away(key, entry); }
   void forget_group(uint64_t key) override { memory_.map.forget_group(key); }
