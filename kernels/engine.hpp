@@ -43,6 +43,8 @@ struct MemoryItems {
 struct FrameView {
   ImageView<const uint16_t> depth_raw;
   ImageView<const Rgb8> colour;
+  float period_s =
+      0;  ///< mean time between frames, of what is counted in seconds; 0: as before, at first 1/30
 };
 
 struct PrepareResult {

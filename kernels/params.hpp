@@ -102,7 +102,7 @@ struct TrackParams {
       "a point weighs s^2 / (s^2 + variance along the normal); 0: noise changes no weight");
     f("trust_area_m", &P::trust_area_m, 0, 20.0, "m", "ours",
       "in the first registration nearer points weigh less, with the square of their depth, as the area that "
-      "they cover, once the map is mask.reabsorb_frames old; 0: off");
+      "they cover, once the map is mask.reabsorb_s old; 0: off");
     f("probation_trust", &P::probation_trust, 0, 1.0, "1", "ours",
       "in the second registration, of what the map has seen too seldom for its mesh (map.mesh_min_surface)");
     f("first_finest_level", &P::first_finest_level, 0, 2, "level", "ours",
@@ -169,7 +169,10 @@ struct MaskParams {
   float blob_m2 = 0.004f;
   float grow_m = 0.03f;
   bool warp = true;
-  int32_t reabsorb_frames = 30;
+  int32_t empty_looks = 1;
+  float empty_s = 0.0f;
+  float empty_reach_m = 0.0f;
+  float reabsorb_s = 1.0f;
 
   template <class F>
   static void fields(F&& f) {
@@ -206,8 +209,14 @@ struct MaskParams {
       "a connected area of contradicting points this large is dynamic by itself");
     f("grow_m", &P::grow_m, 0, 0.5, "m", "ours", "how far the mask grows beyond what was found");
     f("warp", &P::warp, 0, 1, "bool", "ours", "the last mask, carried into this frame, is the first guess");
-    f("reabsorb_frames", &P::reabsorb_frames, 1, 255, "frames", "ours",
-      "what contradicts the map but stood still for so long is static; 255: never");
+    f("empty_looks", &P::empty_looks, 1, 255, "observations", "ours",
+      "parts: space is reliably empty once it was seen free so often, at most integrate.weight_cap; what is "
+      "in it sooner is unknown, not dynamic");
+    f("empty_s", &P::empty_s, 0, 8.0, "s", "ours", "and for so long, at the rate of the frames");
+    f("empty_reach_m", &P::empty_reach_m, 0, 0.5, "m", "ours",
+      "and so were its six neighbours at this distance; 0: they are not asked");
+    f("reabsorb_s", &P::reabsorb_s, 0, 600.0, "s", "ours",
+      "what contradicts the map but stood still in view for so long is static; 0: never");
   }
 };
 

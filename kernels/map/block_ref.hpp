@@ -82,13 +82,17 @@ struct SeenVoxels {
 struct BlockAt {
   const VoxelBlock* voxels = nullptr;  ///< null: nothing is known
   const SeenVoxels* seen = nullptr;    ///< not null: the other voxels are unobserved
+  uint32_t looks = 0;                  ///< above 0: at a free block without voxels
 
   STILLMAP_HD explicit operator bool() const { return voxels != nullptr; }
   STILLMAP_HD VoxelSurface surface(int32_t voxel) const {
     return !seen || seen->has(voxel) ? voxels->surface[voxel] : VoxelSurface{};
   }
   STILLMAP_HD VoxelRecord record(int32_t voxel) const {
-    return !seen || seen->has(voxel) ? voxels->record[voxel] : VoxelRecord{};
+    if (seen && !seen->has(voxel)) return {};
+    VoxelRecord record = voxels->record[voxel];
+    if (looks > 0) record.weight = static_cast<uint8_t>(looks < 255 ? looks : 255);
+    return record;
   }
 };
 

@@ -43,9 +43,9 @@ struct VolumeView {
   }
   STILLMAP_HD BlockAt read(Int3 block) const {
     const BlockRef ref = ref_of(block);
-    if (has_id(ref)) return {&blocks[ref], nullptr};
-    if (is_free(ref)) return {free_block, nullptr};
-    if (is_partly(ref)) return {free_block, &partly[payload(ref)]};
+    if (has_id(ref)) return {&blocks[ref], nullptr, 0};
+    if (is_free(ref)) return {free_block, nullptr, payload(ref)};
+    if (is_partly(ref)) return {free_block, &partly[payload(ref)], partly[payload(ref)].looks};
     return {};
   }
 };

@@ -91,9 +91,10 @@ struct CellGrid {
   ImageView<CellResidual> residual;
   ImageView<uint8_t> fused;     ///< measurements that made the map's surface there; few: it is on probation
   ImageView<float> crept_m;     ///< how far it has gone along its normal in that time
-  ImageView<uint8_t> still;     ///< frames that the surface in a cell has been where it is, at most 255
+  ImageView<uint16_t> still;    ///< frames that the surface in a cell has been where it is, at most 65535
   ImageView<uint8_t> dynamic;   ///< 0: static, kTouched, or 255: dynamic
   ImageView<uint8_t> expected;  ///< kDoubted, or dynamic by the last frame's mask, carried into this one
+  int32_t settled_frames = 0;   ///< mask.reabsorb_s: what is still for so many is static; 0: never
   ImageView<int32_t> part;      ///< number of the connected part a cell belongs to; < 0: none
 
   STILLMAP_HD Vec3 point(int32_t row, int32_t col) const {
@@ -184,6 +185,8 @@ struct CellEvidencePass {
   DepthNoise noise;
   float contradict_m;
   float contradict_sigmas;
+  int32_t empty_looks = 1;         ///< space that was seen free less often says nothing
+  int32_t empty_reach_voxels = 0;  ///< and so its neighbours; 0: they are not asked
 
   template <class Cache>
   STILLMAP_HD void operator()(int32_t row, int32_t col, Cache& cache) const {
@@ -200,7 +203,11 @@ struct CellEvidencePass {
       const float off = fabsf(residual.terms.depth_residual_m) / limit_m;
       contradiction = fminf(fmaxf(2.0f * (off - 0.5f), 0.0f), 1.0f);
       if (contradiction > 0.0f && behind_another(row, col, residual.terms)) contradiction = kUnknown;
-      fused = fused_at(track.point_of(static_cast<float>(row), static_cast<float>(col), z_m).cell, cache);
+      const Int3 voxel =
+          nearest_voxel(track.point_of(static_cast<float>(row), static_cast<float>(col), z_m).cell);
+      fused = record_at(voxel, cache).colour_weight;
+      const bool in_free_space = residual.terms.depth_residual_m > 0.0f;
+      if (contradiction > 0.0f && in_free_space && !reliably_empty(voxel, cache)) contradiction = kUnknown;
     }
     cells.fused.at(row, col) = fused;
     cells.residual.at(row, col) = residual;
@@ -215,21 +222,35 @@ struct CellEvidencePass {
     return terms.depth_residual_m < 0.0f && dot(facing, facing) > 0.5f &&
            dot(facing, towards) < kSameFacing * norm(towards);
   }
-  /// Measurements on a surface in the voxel next to a point.
-  template <class Cache>
-  STILLMAP_HD uint8_t fused_at(const GridCell<float>& cell, Cache& cache) const {
+  STILLMAP_HD static Int3 nearest_voxel(const GridCell<float>& cell) {
     const auto up = [](float fraction) { return fraction >= 0.5f ? 1 : 0; };
-    const Int3 voxel = {cell.x + up(cell.fraction.x), cell.y + up(cell.fraction.y),
-                        cell.z + up(cell.fraction.z)};
+    return {cell.x + up(cell.fraction.x), cell.y + up(cell.fraction.y), cell.z + up(cell.fraction.z)};
+  }
+  template <class Cache>
+  STILLMAP_HD VoxelRecord record_at(Int3 voxel, Cache& cache) const {
     const BlockAt block = lookup(track.map, pack(block_of_voxel(voxel)), cache);
-    return block ? block.record(index_in_block(voxel)).colour_weight : uint8_t{0};
+    return block ? block.record(index_in_block(voxel)) : VoxelRecord{};
+  }
+  /// Seen often enough, here and around: what was looked at once may have been noise, or a hole in a mover.
+  template <class Cache>
+  STILLMAP_HD bool reliably_empty(Int3 voxel, Cache& cache) const {
+    if (record_at(voxel, cache).weight < empty_looks) return false;
+    const int32_t reach = empty_reach_voxels;
+    for (int32_t i = 0; reach > 0 && i < 6; ++i) {
+      const int32_t step = i & 1 ? reach : -reach, axis = i >> 1;
+      const Int3 neighbour = {voxel.x + (axis == 0 ? step : 0), voxel.y + (axis == 1 ? step : 0),
+                              voxel.z + (axis == 2 ? step : 0)};
+      if (record_at(neighbour, cache).weight < empty_looks) return false;
+    }
+    return true;
   }
 };
 
 /// What a cell showed in the last frame.
 struct CellsBefore {
   ImageView<float> depth_m, luma, crept_m;
-  ImageView<uint8_t> dynamic, still;
+  ImageView<uint8_t> dynamic;
+  ImageView<uint16_t> still;
 };
 
 /// Counts for how many frames the surface of a cell has been in its place: the last frame, looked at from
@@ -246,7 +267,7 @@ struct StillPass {
     float crept_m = 0;
     if (cells.depth_m.at(row, col) > 0.0f) look_back(row, col, frames, crept_m);
     cells.crept_m.at(row, col) = crept_m;
-    cells.still.at(row, col) = static_cast<uint8_t>(frames < 0 ? 0 : frames < 255 ? frames : 255);
+    cells.still.at(row, col) = static_cast<uint16_t>(frames < 0 ? 0 : frames < 65535 ? frames : 65535);
   }
 
  private:

@@ -46,8 +46,8 @@ bool joined(const CellGrid& cells, int32_t ra, int32_t ca, int32_t rb, int32_t c
 }
 
 /// Stood still for so long that it is static, whatever the map says.
-bool settled(const CellGrid& cells, int32_t r, int32_t c, const MaskParams& params) {
-  return params.reabsorb_frames < 255 && cells.still.at(r, c) >= params.reabsorb_frames;
+bool settled(const CellGrid& cells, int32_t r, int32_t c) {
+  return cells.settled_frames > 0 && cells.still.at(r, c) >= cells.settled_frames;
 }
 
 float cell_area_m2(const CellGrid& cells, int32_t r, int32_t c) {
@@ -182,8 +182,7 @@ void add_to_box(Part& part, int32_t r, int32_t c) {
 
 }  // namespace
 
-void gather_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory, const MaskParams& params,
-                  const DepthNoise& noise) {
+void gather_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory, const DepthNoise& noise) {
   for (int32_t i = 0; i < parts; ++i) memory.parts[static_cast<uint32_t>(i)] = {};
   for (int32_t r = 0; r < cells.part.rows; ++r)
     for (int32_t c = 0; c < cells.part.cols; ++c) {
@@ -192,7 +191,7 @@ void gather_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory
       const Contradiction contradiction = cells.evidence.at(r, c);
       add_to_box(part, r, c);
       ++part.cells;
-      part.settled += settled(cells, r, c, params);
+      part.settled += settled(cells, r, c);
       part.expected += cells.expected.at(r, c) > kDoubted;
       part.expected_inside += cells.expected.at(r, c) > kTouched;
       const float area_m2 = cell_area_m2(cells, r, c);
@@ -369,12 +368,10 @@ void decide_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory
   set_blobs(cells, memory, params.moved_m2, 0, [&](int32_t r, int32_t c) {
     if (cells.part.at(r, c) < 0 || !cells.dynamic.at(r, c)) return false;
     const Contradiction evidence = cells.evidence.at(r, c);
-    return !part_of(r, c).moved &&
-           ((evidence >= 0.0f && evidence < kContradicts) || settled(cells, r, c, params));
+    return !part_of(r, c).moved && ((evidence >= 0.0f && evidence < kContradicts) || settled(cells, r, c));
   });
-  set_blobs(cells, memory, params.blob_m2, kSet, [&](int32_t r, int32_t c) {
-    return cells.evidence.at(r, c) >= 1.0f && !settled(cells, r, c, params);
-  });
+  set_blobs(cells, memory, params.blob_m2, kSet,
+            [&](int32_t r, int32_t c) { return cells.evidence.at(r, c) >= 1.0f && !settled(cells, r, c); });
   grow(cells, memory, params.grow_m);
 }
 

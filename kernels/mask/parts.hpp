@@ -13,7 +13,7 @@ struct Part {
   int32_t cells = 0, expected = 0;
   int32_t expected_inside = 0;                     ///< without what was only kTouched
   int32_t row0 = 0, row1 = 0, col0 = 0, col1 = 0;  ///< all its cells lie in here, ends excluded
-  int32_t settled = 0;                             ///< cells that stood still for mask.reabsorb_frames
+  int32_t settled = 0;                             ///< cells that stood still for CellGrid::settled_frames
   float known = 0, contradicts = 0;       ///< cells with a value in the map; sum of their contradiction
   float area_m2 = 0, contradicts_m2 = 0;  ///< as seen; of what contradicts
   float noise_m = 0;                      ///< mean of the cells' noise
@@ -51,8 +51,7 @@ inline float may_move_m(const Part& part, const MaskParams& params) {
 }
 
 /// Adds up evidence and least squares of each part.                    test: parts_test
-void gather_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory, const MaskParams& params,
-                  const DepthNoise& noise);
+void gather_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory, const DepthNoise& noise);
 
 /// The motion that most of the *space* agrees on: movers may fill the picture, but not the room. Parts that
 /// follow another motion lose their vote; fills Part::moved_m.           test: parts_test

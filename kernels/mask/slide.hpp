@@ -16,7 +16,7 @@ struct EarlierCells {
 
 /// Where a part that contradicts the map, or lies off it, has slid since `earlier`, its cells do not count as
 /// still: their count starts again (cells.still, Part::settled).    test: slide_test
-/// @param earlier about mask.reabsorb_frames ago; @param T_earlier_now pose of this camera in that one's
+/// @param earlier about mask.reabsorb_s ago; @param T_earlier_now pose of this camera in that one's
 /// frame, by the motion that most of the space agrees on
 void restart_sliding(const CellGrid& cells, int32_t parts, const PartMemory& memory, const MaskParams& params,
                      const DepthNoise& noise, const EarlierCells& earlier, const Se3& T_earlier_now);

@@ -64,7 +64,8 @@ FrameResult Pipeline::process(const RgbdFrame& frame) {
   lost_ = lost_ || blind_too_long(frame.depth_stamp);
   result.state = lost_ ? TrackingState::lost : TrackingState::good;
 
-  const PrepareResult prepared = engine_.prepare({frame.depth_raw, frame.colour});
+  const PrepareResult prepared =
+      engine_.prepare({frame.depth_raw, frame.colour, static_cast<float>(mean_period_s_)});
   result.status = prepared.status;
   result.ms.prepare_ms = watch.lap_ms();
   if (prepared.status == Status::ok) {
@@ -182,11 +183,22 @@ void Pipeline::remember(const FrameResult& result) {
   else if (!lost)
     predictor_.update(result.stamp, result.T_map_cam);
   lost_ = lost;
-  const int64_t period_ns = result.stamp.ns - stamp_.ns;
-  if (counters_.frames - counters_.bad_frames > 1 && period_ns > 0)
-    frame_period_ns_ = frame_period_ns_ > 0 ? std::min(frame_period_ns_, period_ns) : period_ns;
+  measure_period(result.stamp);
   stamp_ = result.stamp;
   T_map_cam_ = result.T_map_cam;
+}
+
+void Pipeline::measure_period(Stamp stamp) {
+  const int64_t period_ns = stamp.ns - stamp_.ns;
+  if (counters_.frames - counters_.bad_frames <= 1 || period_ns <= 0) return;
+  frame_period_ns_ = frame_period_ns_ > 0 ? std::min(frame_period_ns_, period_ns) : period_ns;
+  // A gap is one long period, whatever its length.
+  constexpr double kGain = 0.05, kLongest = 4.0;
+  const double period_s = static_cast<double>(period_ns) * 1e-9;
+  mean_period_s_ =
+      mean_period_s_ > 0
+          ? mean_period_s_ + kGain * (std::min(period_s, kLongest * mean_period_s_) - mean_period_s_)
+          : period_s;
 }
 
 }  // namespace stillmap

@@ -67,6 +67,7 @@ class Pipeline {
   FrameResult go_on_blind(FrameResult result);
   bool blind_too_long(Stamp stamp) const;
   void remember(const FrameResult& result);
+  void measure_period(Stamp stamp);
 
   Engine& engine_;
   Config config_;
@@ -77,6 +78,7 @@ class Pipeline {
   float explained_ = 0;          ///< share of the valid pixels on the map, last first registration
   Stamp stamp_;                  ///< of the last usable frame
   int64_t frame_period_ns_ = 0;  ///< shortest between two usable frames, 0: not known yet
+  double mean_period_s_ = 0;     ///< of late, between usable frames; 0: not known yet
   bool have_map_ = false;
   bool lost_ = false;
 };

@@ -23,7 +23,7 @@ namespace {
 constexpr int32_t kRowsPerTile = 16;  ///< of the finest level; a multiple of the coarsest step
 constexpr uint32_t kGroupsPerTile = 16;
 constexpr uint32_t kBlocksPerTile = 32;
-/// Frames kept to see what slides; the oldest is mask.reabsorb_frames old, or a third more.
+/// Frames kept to see what slides; the oldest is mask.reabsorb_s old, or a third more.
 constexpr int32_t kEarlier = 4;
 
 /// A length or count of 640x480 pixels, scaled to the image.
@@ -142,13 +142,13 @@ struct CpuMemory {
     cells.fused = arena.take_image<uint8_t>("parts", rows, cols);
     cells.dynamic = arena.take_image<uint8_t>("parts", rows, cols);
     cells.part = arena.take_image<int32_t>("parts", rows, cols);
-    cells.still = arena.take_image<uint8_t>("parts", rows, cols);
+    cells.still = arena.take_image<uint16_t>("parts", rows, cols);
     cells.crept_m = arena.take_image<float>("parts", rows, cols);
     before.depth_m = arena.take_image<float>("parts", rows, cols);
     before.luma = arena.take_image<float>("parts", rows, cols);
     before.crept_m = arena.take_image<float>("parts", rows, cols);
     before.dynamic = arena.take_image<uint8_t>("parts", rows, cols);
-    before.still = arena.take_image<uint8_t>("parts", rows, cols);
+    before.still = arena.take_image<uint16_t>("parts", rows, cols);
     for (EarlierCells& e : earlier) {
       e.depth_m = arena.take_image<float>("parts", rows, cols);
       e.luma = arena.take_image<float>("parts", rows, cols);
@@ -252,8 +252,15 @@ class CpuEngine final : public Engine {
   TrackPass track_pass(const Se3& T_map_cam) const;
   TrackResult register_to_map(const Se3& T_start, ImageView<const uint8_t> trust, LevelRange levels,
                               const PosePrior& prior);
+  int32_t frames_in(float seconds) const {
+    return static_cast<int32_t>(std::lround(std::min(seconds / period_s_, 65535.0f)));
+  }
+  /// What never settles is compared with what was a second ago.
+  int32_t reabsorb_frames() const {
+    return std::max(1, frames_in(params_.mask.reabsorb_s > 0 ? params_.mask.reabsorb_s : 1.0f));
+  }
   uint32_t masks_between_earlier() const {
-    return static_cast<uint32_t>(std::max(1, params_.mask.reabsorb_frames / (kEarlier - 1)));
+    return static_cast<uint32_t>(std::max(1, reabsorb_frames() / (kEarlier - 1)));
   }
   bool by_parts() const { return params_.mask.enabled && params_.mask.method == MaskMethod::parts; }
   void make_cells();
@@ -285,9 +292,10 @@ class CpuEngine final : public Engine {
   VisibleGroupPass last_view_;  ///< of the last integrated frame
   uint32_t groups_looked_at_ = 0;
   float usual_ = 1.0f;
-  Se3 T_before_;            ///< pose of the last mask
-  uint32_t masks_ = 0;      ///< masks made since the map was empty
-  bool continued_ = false;  ///< the map, or part of it, is older than this engine
+  float period_s_ = 1.0f / 30.0f;  ///< FrameView::period_s
+  Se3 T_before_;                   ///< pose of the last mask
+  uint32_t masks_ = 0;             ///< masks made since the map was empty
+  bool continued_ = false;         ///< the map, or part of it, is older than this engine
 };
 
 void CpuEngine::fill_source_pixels() {
@@ -302,6 +310,7 @@ PrepareResult CpuEngine::prepare(const FrameView& frame) {
   if (!right_size(frame.depth_raw.rows, frame.depth_raw.cols) ||
       !right_size(frame.colour.rows, frame.colour.cols))
     return {Status::bad_data, 0};
+  if (frame.period_s > 0.0f) period_s_ = frame.period_s;
   const PreparePass pass{frame.depth_raw,
                          frame.colour,
                          memory_.depth_m,
@@ -379,7 +388,7 @@ void CpuEngine::make_cells() {
 /// Trust of every pixel: from the expected mask before the decision, from the mask after it. In a young map
 /// nothing is better known than what is near: without it the pose slides along the rest.
 void CpuEngine::write_static_pixels(bool masked) {
-  const bool young = !continued_ && masks_ < static_cast<uint32_t>(params_.mask.reabsorb_frames);
+  const bool young = !continued_ && masks_ < static_cast<uint32_t>(reabsorb_frames());
   StaticPixelPass pass{memory_.cells,
                        memory_.depth_m,
                        masked ? memory_.mask : ImageView<uint8_t>{},
@@ -399,21 +408,28 @@ Se3 moved_about_centre(const Se3& T_map_cam, const Twistd& motion) {
 }
 
 void CpuEngine::mask_by_parts(const Se3& T_map_cam) {
-  const CellGrid& cells = memory_.cells;
+  CellGrid& cells = memory_.cells;
+  cells.settled_frames = params_.mask.reabsorb_s > 0 ? reabsorb_frames() : 0;
   const DepthNoise noise = depth_noise(params_.depth, k());
   TrackPass track = track_pass(T_map_cam);
   track.k = cells.k;
   set_kernel(params_, 2, track.weights);
-  const CellEvidencePass evidence{cells, track, noise, params_.mask.contradict_m,
-                                  params_.mask.contradict_sigmas};
+  const MaskParams& p = params_.mask;
+  const CellEvidencePass evidence{
+      cells,
+      track,
+      noise,
+      p.contradict_m,
+      p.contradict_sigmas,
+      std::min(std::max(p.empty_looks, frames_in(p.empty_s)), params_.integrate.weight_cap),
+      static_cast<int32_t>(std::lround(p.empty_reach_m / params_.map.voxel_m))};
   in_row_tiles(cells.depth_m.rows,
                [&](int32_t first, int32_t last) { loops_.cell_evidence(evidence, first, last); });
-  const StillPass still{cells, memory_.before, inverse(T_before_) * T_map_cam, noise,
-                        params_.mask.reabsorb_frames / 2};
+  const StillPass still{cells, memory_.before, inverse(T_before_) * T_map_cam, noise, reabsorb_frames() / 2};
   in_row_tiles(cells.depth_m.rows,
                [&](int32_t first, int32_t last) { loops_.still_cells(still, first, last); });
   const int32_t parts = segment(cells, memory_.part_memory, params_.mask, noise);
-  gather_parts(cells, parts, memory_.part_memory, params_.mask, noise);
+  gather_parts(cells, parts, memory_.part_memory, noise);
   const Twistd motion = agree_on_motion(parts, memory_.part_memory, params_.mask, usual_);
   const Se3 T_agreed = moved_about_centre(T_map_cam, motion);
   // Two of them: who swings back to where it was then was elsewhere in between.
@@ -451,7 +467,7 @@ void CpuEngine::forget_cells() {
   const CellsBefore& before = memory_.before;
   std::fill_n(before.depth_m.data, before.depth_m.pixels(), 0.0f);
   std::fill_n(before.dynamic.data, before.dynamic.pixels(), uint8_t{0});
-  std::fill_n(before.still.data, before.still.pixels(), uint8_t{0});
+  std::fill_n(before.still.data, before.still.pixels(), uint16_t{0});
   for (const EarlierCells& earlier : memory_.earlier)
     std::fill_n(earlier.depth_m.data, earlier.depth_m.pixels(), 0.0f);
   masks_ = 0;

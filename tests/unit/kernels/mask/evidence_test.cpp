@@ -77,6 +77,38 @@ TEST_F(EvidenceTest, WellBeforeTheSurfaceItDoesInFull) {
   EXPECT_EQ(cells.evidence.at(kRow, kCol), 1.0f);
 }
 
+TEST_F(EvidenceTest, SpaceIsEmptyOnceItWasSeenOftenHereAndAround) {
+  cells.depth_m.at(kRow, kCol) -= 0.075f;
+  pass.empty_looks = 3;
+  look(kRow, kCol);
+  EXPECT_EQ(cells.evidence.at(kRow, kCol), kUnknown);  // it was seen once
+  const Vec3 p = cells.point(kRow, kCol);
+  const auto nearest = [](float m) { return static_cast<int32_t>(std::lround(m / kVoxelM)); };
+  const Int3 at = {nearest(p.x), nearest(p.y), nearest(p.z)};
+  map.record(at).weight = 3;
+  look(kRow, kCol);
+  EXPECT_EQ(cells.evidence.at(kRow, kCol), 1.0f);
+
+  pass.empty_reach_voxels = 1;
+  const Int3 neighbours[6] = {{at.x - 1, at.y, at.z}, {at.x + 1, at.y, at.z}, {at.x, at.y - 1, at.z},
+                              {at.x, at.y + 1, at.z}, {at.x, at.y, at.z - 1}, {at.x, at.y, at.z + 1}};
+  for (const Int3 neighbour : neighbours) {
+    look(kRow, kCol);
+    EXPECT_EQ(cells.evidence.at(kRow, kCol), kUnknown);
+    map.record(neighbour).weight = 3;
+  }
+  look(kRow, kCol);
+  EXPECT_EQ(cells.evidence.at(kRow, kCol), 1.0f);
+}
+
+TEST_F(EvidenceTest, ASurfaceThatMovedAwayNeedsNoEmptySpace) {
+  cells.depth_m.at(kRow, kCol) += 0.075f;
+  cells.normal.at(kRow, kCol) = {};
+  pass.empty_looks = 200;
+  look(kRow, kCol);
+  EXPECT_EQ(cells.evidence.at(kRow, kCol), 1.0f);
+}
+
 TEST_F(EvidenceTest, BehindAMappedSurfaceOnlyOneThatFacesTheSameWayContradicts) {
   const Vec3 point = cells.point(kRow, kCol);
   look(kRow, kCol);

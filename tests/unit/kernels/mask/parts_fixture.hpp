@@ -32,13 +32,14 @@ class PartsTest : public testing::Test {
     cells.evidence = image(evidence, 0.0f);
     cells.residual = image(residual, CellResidual{});
     cells.crept_m = image(crept, 0.0f);
-    cells.still = image(still, uint8_t{0});
+    cells.still = image(still, uint16_t{0});
+    cells.settled_frames = 30;
     cells.fused = image(fused, uint8_t{0});
     cells.expected = image(expected, uint8_t{0});
     cells.dynamic = image(dynamic, uint8_t{0});
     cells.part = image(part, int32_t{-1});
     before = {image(depth_before, kWallM), image(luma_before, 20000.0f), image(crept_before, 0.0f),
-              image(dynamic_before, uint8_t{0}), image(still_before, uint8_t{9})};
+              image(dynamic_before, uint8_t{0}), image(still_before, uint16_t{9})};
     memory.border = image(border, uint8_t{0});
     memory.scratch = image(scratch, uint8_t{0});
     parts.resize(kRows * kCols);
@@ -69,7 +70,7 @@ class PartsTest : public testing::Test {
   }
   int32_t decide() {
     const int32_t count = segment(cells, memory, params, noise);
-    gather_parts(cells, count, memory, params, noise);
+    gather_parts(cells, count, memory, noise);
     agree_on_motion(count, memory, params, usual);
     decide_parts(cells, count, memory, params, usual);
     return count;
@@ -105,7 +106,8 @@ class PartsTest : public testing::Test {
   std::vector<float> depth, luma, evidence, crept, depth_before, luma_before, crept_before;
   std::vector<Vec3> normal;
   std::vector<CellResidual> residual;
-  std::vector<uint8_t> still, fused, expected, dynamic, dynamic_before, still_before, border, scratch;
+  std::vector<uint8_t> fused, expected, dynamic, dynamic_before, border, scratch;
+  std::vector<uint16_t> still, still_before;
   std::vector<int32_t> part, queue;
   std::vector<Part> parts;
 };

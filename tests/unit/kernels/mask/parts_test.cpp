@@ -79,7 +79,7 @@ TEST_F(PartsTest, WhatStoodStillForLongIsStaticAgain) {
   in(kBox, [&](int32_t r, int32_t c) { cells.still.at(r, c) = 61; });
   decide();
   EXPECT_EQ(dynamic_cells(), 0);
-  params.reabsorb_frames = 255;
+  cells.settled_frames = 0;  // never
   decide();
   EXPECT_EQ(dynamic_cells(), 400);
 }
@@ -99,7 +99,7 @@ TEST_F(PartsTest, TheLargerSpaceDecidesWhatMovesNotTheLargerPicture) {
   shift({0, kRows, 0, kCols}, {});
   shift(box, {0.02f, 0, 0.01f});
   const int32_t count = segment(cells, memory, params, noise);
-  gather_parts(cells, count, memory, params, noise);
+  gather_parts(cells, count, memory, noise);
   const Twistd motion = agree_on_motion(count, memory, params, usual);
   EXPECT_LT(norm(motion.v), 0.002);
   decide_parts(cells, count, memory, params, usual);
@@ -111,7 +111,7 @@ TEST_F(PartsTest, WhenTheCameraMovedNothingElseDid) {
   put(kBox, kNearM, 0);
   shift({0, kRows, 0, kCols}, {0.02f, -0.01f, 0.01f});
   const int32_t count = segment(cells, memory, params, noise);
-  gather_parts(cells, count, memory, params, noise);
+  gather_parts(cells, count, memory, noise);
   const Twistd motion = agree_on_motion(count, memory, params, usual);
   EXPECT_NEAR(motion.v.x, -0.02, 0.002);
   EXPECT_NEAR(motion.v.y, 0.01, 0.002);
@@ -124,12 +124,12 @@ TEST_F(PartsTest, ASensorWithWarpedDepthRaisesWhatIsUsual) {
   shift({0, kRows, 0, kCols}, {});
   shift({0, 20, 0, kCols}, {0, 0, 0.03f});  // nothing fits: half of the wall, too
   const int32_t count = segment(cells, memory, params, noise);
-  gather_parts(cells, count, memory, params, noise);
+  gather_parts(cells, count, memory, noise);
   agree_on_motion(count, memory, params, usual);
   EXPECT_GE(usual, 1.0f);
   const float high = usual = 4.0f;
   shift({0, kRows, 0, kCols}, {});
-  gather_parts(cells, count, memory, params, noise);
+  gather_parts(cells, count, memory, noise);
   agree_on_motion(count, memory, params, usual);
   EXPECT_LT(usual, high);
   EXPECT_GT(usual, 3.9f);  // it comes down in seconds, not at once

@@ -33,7 +33,7 @@ class SlideTest : public PartsTest {
   /// Cells of the box that still count as still.
   int32_t still_after(const Se3& T_earlier_now = {}) {
     const int32_t count = segment(cells, memory, params, noise);
-    gather_parts(cells, count, memory, params, noise);
+    gather_parts(cells, count, memory, noise);
     agree_on_motion(count, memory, params, usual);
     restart_sliding(cells, count, memory, params, noise, earlier, T_earlier_now);
     int32_t left = 0, settled = 0;

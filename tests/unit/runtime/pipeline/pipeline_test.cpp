@@ -12,8 +12,9 @@ namespace {
 /// An engine that answers as told and writes down what it was asked.
 class ScriptedEngine : public Engine {
  public:
-  PrepareResult prepare(const FrameView&) override {
+  PrepareResult prepare(const FrameView& frame) override {
     calls += 'p';
+    period_s = frame.period_s;
     return {prepare_status, 1000};
   }
   TrackResult track(const Se3& T_start, const PosePrior&) override {
@@ -79,6 +80,7 @@ class ScriptedEngine : public Engine {
   int32_t masked_pixels = 0, keyframes = 0;
   PlaceResult place;
   Se3 find_guess;
+  float period_s = -1;  ///< told with the last frame
   Se3 track_start, mask_pose, refine_start, integrate_pose;
 };
 
@@ -125,6 +127,20 @@ TEST_F(PipelineTest, TheFirstFrameIsTheMap) {
   EXPECT_EQ(result.sequence, 33u);
   EXPECT_EQ(result.map.blocks, 77u);
   EXPECT_EQ(pipeline.counters().frames, 1u);
+}
+
+TEST_F(PipelineTest, TheEngineIsToldHowFarApartFramesAre) {
+  Pipeline pipeline(engine_, config_);
+  answer(at(0));
+  process(pipeline, 0);
+  EXPECT_EQ(engine_.period_s, 0.0f);  // nobody knows
+  for (const int64_t ms : {40, 80, 120}) process(pipeline, ms);
+  EXPECT_NEAR(engine_.period_s, 0.040f, 1e-6f);
+  process(pipeline, 5120);  // a gap is hardly a longer period
+  process(pipeline, 5160);
+  EXPECT_NEAR(engine_.period_s, 0.046f, 1e-6f);
+  for (int64_t ms = 5260; ms < 20000; ms += 100) process(pipeline, ms);
+  EXPECT_NEAR(engine_.period_s, 0.1f, 1e-3f);
 }
 
 TEST_F(PipelineTest, InAMapThatIsThereTheCameraIsFoundBeforeAnythingIsMapped) {

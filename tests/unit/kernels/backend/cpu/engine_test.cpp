@@ -58,6 +58,7 @@ CornerScene with_box() {
 /// An engine and what it makes of views.
 struct Rig {
   std::unique_ptr<Engine> engine;
+  float period_s = 0;  ///< told with every frame to be masked
 
   explicit Rig(const EngineParams& params) : engine(make_cpu_engine(params)) {}
 
@@ -70,7 +71,9 @@ struct Rig {
     return result;
   }
   MaskResult mask(const CornerView& view, const Se3& T = {}) {
-    EXPECT_EQ(engine->prepare(frame_of(view)).status, Status::ok);
+    FrameView frame = frame_of(view);
+    frame.period_s = period_s;
+    EXPECT_EQ(engine->prepare(frame).status, Status::ok);
     return engine->mask(T);
   }
   std::vector<float> depth_of_map(const Intrinsics& k, const Se3& T = {}) {
@@ -252,7 +255,7 @@ int32_t frames_until_static(Rig& rig, const CornerView& view, int32_t at_most) {
 
 TEST(CpuEngine, ABoxThatCameAndStaysIsStaticAndMapped) {
   EngineParams p = small_params();
-  p.mask.reabsorb_frames = 9;
+  p.mask.reabsorb_s = 0.3f;
   Rig rig(p);
   const Intrinsics k = corner_camera(kWidth);
   rig.add(CornerView({}, k, {}), {}, 20);
@@ -266,9 +269,27 @@ TEST(CpuEngine, ABoxThatCameAndStaysIsStaticAndMapped) {
   EXPECT_NEAR(depth[static_cast<size_t>(k.height / 2 * k.width + k.width / 2)], 1.0f, 0.01f);
 }
 
+TEST(CpuEngine, WhatHasToLastIsCountedInSeconds) {
+  EngineParams p = small_params();
+  p.mask.reabsorb_s = 0.6f;
+  p.mask.empty_s = 0.4f;
+  for (const int32_t frames_a_second : {10, 20, 50}) {
+    Rig rig(p);
+    rig.period_s = 1.0f / static_cast<float>(frames_a_second);
+    const Intrinsics k = corner_camera(kWidth);
+    const CornerView empty({}, k, {}), view(with_box(), k, {});
+    const int32_t until_empty = frames_a_second * 4 / 10;
+    rig.add(empty, {}, until_empty - 1);
+    EXPECT_EQ(rig.mask(view).masked_pixels, 0) << "nobody knows yet that it is empty there";
+    rig.engine->reset_map();
+    rig.add(empty, {}, until_empty);
+    EXPECT_EQ(frames_until_static(rig, view, 40), frames_a_second * 6 / 10);
+  }
+}
+
 TEST(CpuEngine, AMapThatWasForgottenHasNoPastEither) {
   EngineParams p = small_params();
-  p.mask.reabsorb_frames = 9;
+  p.mask.reabsorb_s = 0.3f;
   Rig rig(p);
   const Intrinsics k = corner_camera(kWidth);
   const CornerView empty({}, k, {}), view(with_box(), k, {});
