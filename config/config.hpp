@@ -122,6 +122,18 @@ struct RecordConfig {
   }
 };
 
+/// What a camera does that is not found again.
+struct LostConfig {
+  float new_map_after_s = 0;
+
+  template <class F>
+  static void fields(F&& f) {
+    using P = LostConfig;
+    f("new_map_after_s", &P::new_map_after_s, 0, 1e6, "s", "ours",
+      "lost for so long: the map is given up and a new one started; 0: never");
+  }
+};
+
 struct RuntimeConfig {
   int32_t threads = 2;
 
@@ -155,6 +167,7 @@ struct Config {
   RelocaliseParams relocalise;
   ArchiveConfig archive;
   RecordConfig record;
+  LostConfig lost;
   RuntimeConfig runtime;
   MemoryConfig memory;
 
@@ -173,6 +186,7 @@ struct Config {
     f("relocalise", &Config::relocalise);
     f("archive", &Config::archive);
     f("record", &Config::record);
+    f("lost", &Config::lost);
     f("runtime", &Config::runtime);
     f("memory", &Config::memory);
   }

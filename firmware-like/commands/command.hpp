@@ -28,6 +28,7 @@ void add_evaluate(CLI::App& app, int& exit_code);
 void add_bench(CLI::App& app, int& exit_code);
 void add_render(CLI::App& app, int& exit_code);
 void add_picture(CLI::App& app, int& exit_code);
+void add_mesh(CLI::App& app, int& exit_code);
 void add_memory_plan(CLI::App& app, int& exit_code);
 void add_check_config(CLI::App& app, int& exit_code);
 /// mesh, replay, top, doctor: their flags parse; calling them says that the part is not in this build.

@@ -157,8 +157,9 @@ int run(const RunOptions& o, FrameObserver* observer) {
   if (map->has_value())
     pipeline.start_lost(o.initial_pose.empty() ? (*map)->info().T_map_cam : plan->T_map_cam);
   Progress progress(frames, o.quiet);
-  const LoopEnd end = run_loop(source, *engine, pipeline, **outputs, progress, slot.frame(), o.max_frames,
-                               observer, archive.get());
+  const LoopLimits limits = {o.max_frames, static_cast<double>(config.lost.new_map_after_s)};
+  const LoopEnd end =
+      run_loop(source, *engine, pipeline, **outputs, progress, slot.frame(), limits, observer, archive.get());
   const double seconds = progress.seconds();
   (*outputs)->finish(*engine, source, pipeline.counters(), archive.get());
   if (!o.quiet) print_summary(o, **outputs, pipeline.counters(), seconds);

@@ -32,15 +32,26 @@ std::string jump_text(const RgbdFrame& frame, Stamp last) {
                      file_stamp(frame.depth_stamp), file_stamp(last));
 }
 
+/// A camera that was not found again for long: what it sees now is all there is to go by. Waits until the
+/// old map is in its file, where one is asked for.
+void give_up_map(const FrameResult& result, Pipeline& pipeline, RunOutputs& outputs, BlockArchive* archive) {
+  if (!outputs.map_may_go()) return;
+  outputs.new_map(result.stamp, pipeline.lost_s());
+  const heap_guard::Scope armed;
+  pipeline.start_new_map();
+  if (archive) archive->forget();
+}
+
 }  // namespace
 
 LoopEnd run_loop(FrameSource& source, Engine& engine, Pipeline& pipeline, RunOutputs& outputs,
-                 Progress& progress, RgbdFrame& slot, uint32_t max_frames, FrameObserver* observer,
+                 Progress& progress, RgbdFrame& slot, const LoopLimits& limits, FrameObserver* observer,
                  BlockArchive* archive) {
   LoopEnd end;
   Stamp last;
   auto report_due = std::chrono::steady_clock::now() + kReportPeriod;
-  for (uint32_t read = 0, done = 0; (max_frames == 0 || read < max_frames) && !stop_requested();) {
+  for (uint32_t read = 0, done = 0;
+       (limits.max_frames == 0 || read < limits.max_frames) && !stop_requested();) {
     const Status status = source.next(slot, kWaitMs);
     if (status == Status::timeout) continue;
     if (status == Status::end) break;
@@ -59,7 +70,10 @@ LoopEnd run_loop(FrameSource& source, Engine& engine, Pipeline& pipeline, RunOut
     end.state = result.state;
     outputs.add(slot, result, engine);
     if (observer) observer->see(slot, result, engine);
+    if (archive) outputs.note_archive_trouble(*archive);
     progress.show(result, ++done);
+    if (limits.new_map_after_s > 0 && pipeline.lost_s() >= limits.new_map_after_s)
+      give_up_map(result, pipeline, outputs, archive);
     if (std::chrono::steady_clock::now() < report_due) continue;
     outputs.rewrite_report(pipeline.counters());
     report_due += kReportPeriod;

@@ -4,6 +4,8 @@
 
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -198,14 +200,42 @@ void RunOutputs::write_mesh(Engine& engine, BlockArchive* archive) {
 }
 
 void RunOutputs::note_archive(const BlockArchive& archive) {
+  note_archive_trouble(archive);
   const ArchiveCounters& c = archive.counters();
   events_.info(last_stamp_, "archive",
                fmt::format("{} groups of blocks stored, {} brought back, {} MB in {} files now", c.stored,
                            c.restored, c.bytes / 1000000, c.groups));
-  if (c.refused > 0)
+}
+
+void RunOutputs::note_archive_trouble(const BlockArchive& archive) {
+  const ArchiveCounters& c = archive.counters();
+  // Each time there are twice as many: an archive may be full for weeks.
+  if (c.refused > 2 * archive_said_.refused) {
+    archive_said_.refused = c.refused;
     events_.fault(last_stamp_, "archive_full",
-                  fmt::format("{} groups could not be stored; raise archive.max_bytes", c.refused));
-  if (c.failed > 0) events_.fault(last_stamp_, "archive_failed", archive.last_error());
+                  fmt::format("{} groups could not be stored so far; raise archive.max_bytes", c.refused));
+  }
+  if (c.failed > 2 * archive_said_.failed) {
+    archive_said_.failed = c.failed;
+    events_.fault(last_stamp_, "archive_failed",
+                  fmt::format("{} so far, the last one: {}", c.failed, archive.last_error()));
+  }
+}
+
+void RunOutputs::new_map(Stamp stamp, double lost_s) {
+  std::string kept;
+  if (map_bytes_ > 0 && lost_maps_ < record_.keep_previous) {
+    const std::string name = fmt::format("map_lost-{}.smap", ++lost_maps_);
+    std::error_code error;
+    std::filesystem::rename(map_saver_->path(), files_->folder.path(name), error);
+    if (error) tell(fmt::format("{}: {}", files_->folder.path(name), error.message()));
+    kept = error ? "" : "; the old one is " + name;
+    map_bytes_ = 0;
+  }
+  truth_ = {};
+  events_.fault(
+      stamp, "new_map",
+      fmt::format("lost for {:.1f} s: a new map begins where the camera was seen last{}", lost_s, kept));
 }
 
 void RunOutputs::prepare_map(const Engine& engine, const BlockArchive* archive) {
@@ -219,14 +249,22 @@ void RunOutputs::save_map_on_the_way(const FrameResult& result) {
   if (!map_save_due_) map_save_due_ = Stamp{result.stamp.ns + period_ns};
   {
     const heap_guard::Scope armed;  // live, these run in the real-time loop
-    if (period_ns > 0 && result.stamp >= *map_save_due_ && result.state != TrackingState::lost &&
-        map_saver_->begin(MapInfo::of(config_, result.T_map_cam, result.stamp))) {
+    if (map_save_is_due(result) && map_saver_->begin(MapInfo::of(config_, result.T_map_cam, result.stamp))) {
       map_saving_ = true;
+      lost_map_wanted_ = false;
       map_save_due_->ns = result.stamp.ns + period_ns;
     }
     map_saver_->step();
   }
   note_map_save();
+}
+
+/// Now and then, and when the camera was lost: the map may be given up soon.
+bool RunOutputs::map_save_is_due(const FrameResult& result) {
+  const bool lost = result.state == TrackingState::lost;
+  if (!lost) lost_map_wanted_ = false;
+  if (lost && last_.state != TrackingState::lost) lost_map_wanted_ = config_.lost.new_map_after_s > 0;
+  return lost_map_wanted_ || (!lost && record_.map_every_s > 0 && result.stamp >= *map_save_due_);
 }
 
 /// How far it is, once a second; how it ended.

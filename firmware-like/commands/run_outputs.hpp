@@ -40,6 +40,13 @@ class RunOutputs {
 
   /// After each processed frame, while the engine still holds it.
   void add(const RgbdFrame& frame, const FrameResult& result, Engine& engine);
+  /// Says at once what the archive refuses or loses. After each frame.
+  void note_archive_trouble(const BlockArchive& archive);
+  /// While the camera is lost: what was mapped is in map.smap, or is not asked for.
+  bool map_may_go() const { return !map_saver_ || (!lost_map_wanted_ && !map_saving_); }
+  /// The map is given up. Its file, where there is one, stays as map_lost-N.smap (record.keep_previous of
+  /// them).
+  void new_map(Stamp stamp, double lost_s);
   /// A frame that was passed over.
   void bad_frame(Stamp stamp, const std::string& why);
   void event(Stamp stamp, const char* name, const std::string& text) { events_.info(stamp, name, text); }
@@ -78,6 +85,7 @@ class RunOutputs {
   bool snapshot_due();
   void write_mesh(Engine& engine, BlockArchive* archive);
   void note_archive(const BlockArchive& archive);
+  bool map_save_is_due(const FrameResult& result);
   void save_map_on_the_way(const FrameResult& result);
   void note_map_save();
   void save_map_at_end();
@@ -103,7 +111,10 @@ class RunOutputs {
   std::unique_ptr<MapSaver> map_saver_;  ///< null: no map is saved
   std::optional<Stamp> map_save_due_;
   std::chrono::steady_clock::time_point map_progress_due_;
-  bool map_saving_ = false;  ///< a save began whose end was not noted yet
+  bool lost_map_wanted_ = false;  ///< the camera was lost: what there is is to be saved
+  int32_t lost_maps_ = 0;
+  ArchiveCounters archive_said_;  ///< in the last event
+  bool map_saving_ = false;       ///< a save began whose end was not noted yet
   uint64_t map_bytes_ = 0;
   double map_seconds_ = 0;
 };

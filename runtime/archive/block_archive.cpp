@@ -23,7 +23,8 @@ namespace fs = std::filesystem;
 
 constexpr uint32_t kMostWantedPerFrame = 16;
 constexpr uint32_t kMostPutAwayPerFrame = 8;
-constexpr uint32_t kFarAtOnce = 256;  ///< found by one walk over the table
+constexpr uint32_t kFarAtOnce = 256;         ///< found by one walk over the table
+constexpr uint32_t kEntriesLookedAt = 1024;  ///< for those to be erased, in one frame
 constexpr size_t kMostFolderLetters = 400;
 constexpr auto kWorkerWait = std::chrono::milliseconds(100);
 constexpr auto kLongestAnswer = std::chrono::milliseconds(30000);  ///< of the disk, for one group
@@ -134,12 +135,39 @@ BlockArchive::~BlockArchive() {
 void BlockArchive::step(Engine& engine, Vec3 centre_map) {
   uint32_t number = 0;
   while (answers_.pop(number)) take_answer(engine, number);
+  erase_doomed();
   fetch_wanted(engine);
   put_away_far(engine, centre_map);
 }
 
+void BlockArchive::forget() {
+  ++map_;
+  far_left_ = 0;
+  for (Entry& entry : entries_) {
+    if (entry.state != EntryState::stored) continue;  // what is on its way is doomed when it arrives
+    entry.state = EntryState::doomed;
+    ++doomed_;
+  }
+}
+
+void BlockArchive::erase_doomed() {
+  for (uint32_t n = 0; doomed_ > 0 && n < kEntriesLookedAt; ++n) {
+    const uint32_t number = doomed_from_++ % options_.max_groups;
+    if (entries_[number].state != EntryState::doomed) continue;
+    if (!send(Order::erase, number)) return;
+    release(number);
+    --doomed_;
+  }
+}
+
 void BlockArchive::take_answer(Engine& engine, uint32_t number) {
   Slot& slot = slots_[number];
+  if (slot.order != Order::erase && slot.map != map_) {
+    entries_[slot.entry].state = EntryState::doomed;
+    ++doomed_;
+    free_slots_.push_back(number);
+    return;
+  }
   if (slot.order == Order::store) stored(engine, slot);
   const bool used_up = slot.order == Order::load && loaded(engine, slot);
   if (used_up) {
@@ -187,14 +215,15 @@ void BlockArchive::release(uint32_t entry) {
 }
 
 /// @return false: all slots are on their way
-bool BlockArchive::send(Order order, uint64_t key, uint32_t entry, uint32_t bytes) {
+bool BlockArchive::send(Order order, uint32_t entry) {
   if (free_slots_.empty()) return false;
   const uint32_t number = free_slots_.back();
   Slot& slot = slots_[number];
   slot.order = order;
-  slot.key = key;
+  slot.key = entries_[entry].key;
+  slot.map = entries_[entry].map;
   slot.entry = entry;
-  slot.bytes = bytes;
+  slot.bytes = entries_[entry].bytes;
   if (!orders_.push(number)) return false;
   free_slots_.pop_back();
   return true;
@@ -205,8 +234,7 @@ void BlockArchive::fetch_wanted(Engine& engine) {
   for (uint32_t i = 0; i < count; ++i) {
     Entry& entry = entries_[wanted_[i].entry];
     const bool is_here = entry.state == EntryState::stored && entry.key == wanted_[i].key;
-    if (is_here && send(Order::load, wanted_[i].key, wanted_[i].entry, entry.bytes))
-      entry.state = EntryState::loading;
+    if (is_here && send(Order::load, wanted_[i].entry)) entry.state = EntryState::loading;
   }
 }
 
@@ -235,9 +263,12 @@ bool BlockArchive::put_away(Engine& engine, uint64_t key) {
     return true;
   }
   const uint32_t entry = free_entries_.back();
-  if (!send(Order::store, key, entry, bytes)) return false;
+  entries_[entry] = {key, bytes, map_, EntryState::storing};
+  if (!send(Order::store, entry)) {
+    entries_[entry] = {};
+    return false;
+  }
   free_entries_.pop_back();
-  entries_[entry] = {key, bytes, EntryState::storing};
   counters_.bytes += bytes;
   ++counters_.groups;
   engine.put_away(key, entry);
@@ -264,13 +295,13 @@ void BlockArchive::work() {
 
 // Plain system calls and no text but on the stack: this thread may not allocate either.
 
-void BlockArchive::path(uint64_t key, Path& out) const {
-  std::snprintf(out.text, sizeof out.text, "%s/%016" PRIx64 ".group", folder_.c_str(), key);
+void BlockArchive::path(uint32_t map, uint64_t key, Path& out) const {
+  std::snprintf(out.text, sizeof out.text, "%s/%" PRIu32 "-%016" PRIx64 ".group", folder_.c_str(), map, key);
 }
 
 bool BlockArchive::write(const Slot& slot) {
   Path name;
-  path(slot.key, name);
+  path(slot.map, slot.key, name);
   const uint64_t sum = checksum(slot.record.data(), slot.bytes);
   const File file(::open(name.text, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
   if (file.is_open() && write_all(file, slot.record.data(), slot.bytes) &&
@@ -283,7 +314,7 @@ bool BlockArchive::write(const Slot& slot) {
 
 bool BlockArchive::read(Slot& slot) {
   Path name;
-  path(slot.key, name);
+  path(slot.map, slot.key, name);
   const File file(::open(name.text, O_RDONLY | O_CLOEXEC));
   errno = 0;
   if (file.is_open() && read_record(file, slot.record.data(), slot.bytes)) return true;
@@ -293,7 +324,7 @@ bool BlockArchive::read(Slot& slot) {
 
 bool BlockArchive::erase(const Slot& slot) {
   Path name;
-  path(slot.key, name);
+  path(slot.map, slot.key, name);
   return ::unlink(name.text) == 0;
 }
 
@@ -318,7 +349,7 @@ uint32_t BlockArchive::list(View<uint64_t> keys) const {
 
 uint32_t BlockArchive::copy(uint64_t key, View<uint8_t> record) const {
   Path name;
-  path(key, name);
+  path(map_, key, name);
   const File file(::open(name.text, O_RDONLY | O_CLOEXEC));
   struct stat about = {};
   if (!file.is_open() || ::fstat(file.descriptor(), &about) != 0) return 0;
@@ -357,6 +388,7 @@ std::string BlockArchive::for_each(Engine& engine, const std::function<bool(View
   for (const Entry& entry : entries_) {
     if (entry.state != EntryState::stored) continue;
     slot.key = entry.key;
+    slot.map = entry.map;
     slot.bytes = entry.bytes;
     if (!read(slot)) return last_error();
     if (!f({slot.record.data(), slot.bytes})) break;

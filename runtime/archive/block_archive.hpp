@@ -59,6 +59,10 @@ class BlockArchive {
   /// @return what went wrong, else nothing.  @thread the engine's caller; waits
   std::string make_room(Engine& engine, Vec3 centre_map);
 
+  /// The map was forgotten: what belonged to it is erased, a few files a step.
+  /// @thread the engine's caller; does not allocate, wait or touch files
+  void forget();
+
   const ArchiveCounters& counters() const { return counters_; }
   /// Keys of what is on disk, as many as fit. @return how many.  @thread the engine's caller
   uint32_t list(View<uint64_t> keys) const;
@@ -73,16 +77,18 @@ class BlockArchive {
   std::string for_each(Engine& engine, const std::function<bool(View<const uint8_t> record)>& f);
 
  private:
-  enum class EntryState : uint8_t { unused, storing, stored, loading };
+  enum class EntryState : uint8_t { unused, storing, stored, loading, doomed };
   struct Entry {
     uint64_t key = 0;
     uint32_t bytes = 0;
+    uint32_t map = 0;  ///< `map_` when it came
     EntryState state = EntryState::unused;
   };
   enum class Order : uint8_t { store, load, erase };
   struct Slot {
     Order order = Order::store;
     uint64_t key = 0;
+    uint32_t map = 0;
     uint32_t entry = 0;
     uint32_t bytes = 0;  ///< of the record
     bool done = false;   ///< the answer: it worked
@@ -95,7 +101,8 @@ class BlockArchive {
   void take_answer(Engine& engine, uint32_t number);
   void stored(Engine& engine, const Slot& slot);
   bool loaded(Engine& engine, const Slot& slot);
-  bool send(Order order, uint64_t key, uint32_t entry, uint32_t bytes);
+  bool send(Order order, uint32_t entry);
+  void erase_doomed();
   void fetch_wanted(Engine& engine);
   void put_away_far(Engine& engine, Vec3 centre_map);
   bool put_away(Engine& engine, uint64_t key);
@@ -105,7 +112,7 @@ class BlockArchive {
   struct Path {
     char text[512];
   };
-  void path(uint64_t key, Path& out) const;
+  void path(uint32_t map, uint64_t key, Path& out) const;
   bool write(const Slot& slot);
   bool read(Slot& slot);
   bool erase(const Slot& slot);
@@ -120,6 +127,9 @@ class BlockArchive {
   std::vector<uint64_t> far_;  ///< to be put away, the nearest first
   std::vector<ArchivedGroup> wanted_;
   uint32_t far_left_ = 0;
+  std::atomic<uint32_t> map_{0};  ///< counts the maps that were forgotten
+  uint32_t doomed_ = 0;           ///< entries
+  uint32_t doomed_from_ = 0;      ///< where the search for them goes on
   ArchiveCounters counters_;
 
   BoundedQueue<uint32_t> orders_, answers_;  ///< numbers of slots

@@ -55,6 +55,17 @@ void Pipeline::start_lost(const Se3d& T_map_cam_guess) {
   have_map_ = lost_ = true;
 }
 
+void Pipeline::start_new_map() {
+  engine_.reset_map();
+  relocaliser_.forget();
+  T_map_cam_ = predictor_.predict(stamp_).T_map_cam;
+  predictor_.restart(stamp_, T_map_cam_);
+  explained_ = 0;
+  have_map_ = lost_ = false;
+  lost_since_.reset();
+  ++counters_.new_maps;
+}
+
 FrameResult Pipeline::process(const RgbdFrame& frame) {
   StopWatch total, watch;
   FrameResult result;
@@ -182,6 +193,8 @@ void Pipeline::remember(const FrameResult& result) {
     predictor_.restart(result.stamp, result.T_map_cam);
   else if (!lost)
     predictor_.update(result.stamp, result.T_map_cam);
+  if (!lost) lost_since_.reset();
+  if (lost && !lost_since_) lost_since_ = result.stamp;
   lost_ = lost;
   measure_period(result.stamp);
   stamp_ = result.stamp;

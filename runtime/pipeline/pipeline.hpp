@@ -3,6 +3,7 @@
 // One frame after the other, in the order of the paper: prepare, track, mask, refine, integrate.
 
 #include <cstdint>
+#include <optional>
 
 #include "config/config.hpp"
 #include "kernels/engine.hpp"
@@ -40,6 +41,7 @@ struct PipelineCounters {
   uint32_t bad_frames = 0;
   uint32_t lost_frames = 0;  ///< bad ones included
   uint32_t relocalised = 0;  ///< returns from lost
+  uint32_t new_maps = 0;     ///< started because the camera was not found again
 };
 
 /// @thread real-time thread; `process` does not allocate, lock, touch files or throw
@@ -56,6 +58,15 @@ class Pipeline {
   void start_lost(const Se3d& T_map_cam_guess);
 
   FrameResult process(const RgbdFrame& frame);
+
+  /// Seconds by the frames' stamps since the camera was found to be lost; 0: it is not.
+  double lost_s() const {
+    return lost_since_ ? static_cast<double>(stamp_.ns - lost_since_->ns) * 1e-9 : 0.0;
+  }
+  /// Forgets the map; the next usable frame begins another one, where the camera was seen last: the poses go
+  /// on, but what was known of before is elsewhere.                                         test:
+  /// pipeline_test
+  void start_new_map();
 
   const PipelineCounters& counters() const { return counters_; }
 
@@ -81,6 +92,7 @@ class Pipeline {
   double mean_period_s_ = 0;     ///< of late, between usable frames; 0: not known yet
   bool have_map_ = false;
   bool lost_ = false;
+  std::optional<Stamp> lost_since_;
 };
 
 }  // namespace stillmap

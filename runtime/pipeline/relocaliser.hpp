@@ -14,7 +14,7 @@ namespace stillmap {
 /// @thread real-time thread; allocates nothing
 class Relocaliser {
  public:
-  Relocaliser(Engine& engine, const RelocaliseParams& params) : engine_(engine), params_(params) {}
+  Relocaliser(Engine& engine, const RelocaliseParams& params) : engine_(&engine), params_(params) {}
 
   bool enabled() const { return params_.enabled; }
 
@@ -26,11 +26,14 @@ class Relocaliser {
   /// @return the pose of this frame once it is believed
   std::optional<Se3d> find(const Se3d& T_map_cam_last);
 
+  /// The map was given up, and its keyframes with it.
+  void forget() { *this = Relocaliser(*engine_, params_); }
+
   /// The last answer of the engine.
   const PlaceResult& last() const { return last_; }
 
  private:
-  Engine& engine_;
+  Engine* engine_;
   RelocaliseParams params_;
   PlaceResult last_;
   int32_t attempt_ = 0;      ///< since the loss

@@ -128,7 +128,7 @@ class Usage(Case):
                           ["run", "--source", SMALL, "--realtime"],
                           ["run", "--source", SMALL, "--set", "record.log=true"],
                           ["run", "--source", "xtion"],
-                          ["mesh", "a.smap", "--out", "b.ply"], ["replay", "a.lcm"], ["top"], ["doctor"],
+                          ["replay", "a.lcm"], ["top"], ["doctor"],
                           ["bench", "soak"]]:
             done = self.refused(2, *arguments)
             self.assertIn("build", done.stderr, arguments)
@@ -395,6 +395,44 @@ class SavedMaps(Case):
         later = read_trajectory(gone_on / "trajectory.txt")
         for a, b in zip(later[15:20], read_trajectory(begun / "trajectory.txt")[55:60]):
             self.assertLess(math.dist(a[1:4], b[1:4]), 0.01)
+
+    def test_long_lost_it_starts_a_new_map_and_keeps_the_old_one(self):
+        folder, frames = self.folder / "two_rooms", []
+        for room, name in enumerate(["static", "corridor"]):
+            source = f"synthetic:{name},size=160x120,seconds=2"
+            done = stillmap("render", "--source", source, "--out", self.folder / name)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            lines = (self.folder / name / "associated.txt").read_text().splitlines()
+            for line in [line.split() for line in lines if not line.startswith("#")]:
+                stamps = [f"{float(line[i]) + 3 * room:.6f}" for i in (0, 2)]
+                frames.append(f"{stamps[0]} ../{name}/{line[1]} {stamps[1]} ../{name}/{line[3]}\n")
+        folder.mkdir()
+        shutil.copy(self.folder / "static" / "camera.toml", folder)
+        (folder / "associated.txt").write_text("".join(frames))
+        self.run_map(self.out, f"tum:{folder}", "--set", "record.map=true", "--set", "lost.new_map_after_s=0.7",
+                     "--set", "track.prior=last_pose")
+        events = (self.out / "events.log").read_text()
+        self.assertIn("new_map: lost for ", events)
+        self.assertIn("map_lost-1.smap", events)
+        states = [row[1] for row in read_csv(self.out / "states.csv")[1:]]
+        self.assertIn("lost", states[60:65])
+        self.assertEqual(states[-1], "good")
+        meshes = [self.folder / "old.ply", self.folder / "new.ply"]
+        for smap, mesh in zip(["map_lost-1.smap", "map.smap"], meshes):
+            done = stillmap("mesh", self.out / smap, "--out", mesh)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertIn("triangles", done.stdout)
+        self.assertEqual(meshes[1].read_bytes(), (self.out / "mesh.ply").read_bytes())
+        self.run_map(self.folder / "first", "synthetic:static,size=160x120,seconds=2")
+        self.assertGreater(self.near(self.folder / "first" / "mesh.ply", meshes[0]), 0.95)
+
+    def test_mesh_of_what_is_no_map_is_refused(self):
+        no_map = self.folder / "no.smap"
+        no_map.write_text("a text that is none\n" * 9)
+        done = stillmap("mesh", no_map, "--out", self.folder / "mesh.ply")
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("no.smap", done.stderr)
+        self.assertFalse((self.folder / "mesh.ply").exists())
 
     def test_where_the_map_is_not_known_the_camera_stays_lost(self):
         self.run_map(self.out, self.SCENE, "--max-frames", "20", "--set", "record.map=true")

@@ -133,6 +133,32 @@ TEST(BlockArchive, AFileThatWasChangedIsReportedAndItsPartOfTheMapForgotten) {
   EXPECT_FALSE(corner_is_away(map));
 }
 
+TEST(BlockArchive, WhatBelongedToAForgottenMapIsErasedAndNeverComesBack) {
+  const Folder folder;
+  MappedCorner map;
+  const std::vector<PointState> corner = map.states();
+  const auto archive = open(all_goes(folder));
+  map.look_away();
+  ASSERT_TRUE(step_until(*archive, *map.engine, [&] { return corner_is_away(map); }));
+  ASSERT_GT(archive->counters().groups, 10u);
+  map.engine->reset_map();  // some are on their way to the disk still
+  archive->forget();
+  const std::vector<PointState> nothing = map.states();
+  ASSERT_TRUE(step_until(*archive, *map.engine, [&] { return archive->counters().groups == 0; }));
+  EXPECT_EQ(archive->counters().bytes, 0u);
+  EXPECT_EQ(map.states(), nothing);
+  // The next map has groups with the same keys.
+  for (int n = 0; n < 3; ++n) map.look(Se3d{});
+  map.look_away();
+  ASSERT_TRUE(step_until(*archive, *map.engine, [&] { return corner_is_away(map); }));
+  ASSERT_TRUE(step_until(*archive, *map.engine, [&] {
+    map.look(Se3d{});
+    return map.states() == corner;
+  }));
+  EXPECT_EQ(archive->counters().failed, 0u);
+  for (const fs::path& file : folder.groups()) EXPECT_EQ(file.filename().string()[0], '1') << file;
+}
+
 TEST(BlockArchive, ItsFilesAreGoneWithIt) {
   const Folder folder;
   {

@@ -71,13 +71,13 @@ class ScriptedEngine : public Engine {
     health.blocks = 77;
     return health;
   }
-  void reset_map() override {}
+  void reset_map() override { ++resets; }
 
   std::string calls;  ///< first letters, in order
   Status prepare_status = Status::ok;
   TrackResult tracked, refined;
   TrackResult tracked_again;  ///< by a second call for the same frame
-  int32_t masked_pixels = 0, keyframes = 0;
+  int32_t masked_pixels = 0, keyframes = 0, resets = 0;
   PlaceResult place;
   Se3 find_guess;
   float period_s = -1;  ///< told with the last frame
@@ -127,6 +127,30 @@ TEST_F(PipelineTest, TheFirstFrameIsTheMap) {
   EXPECT_EQ(result.sequence, 33u);
   EXPECT_EQ(result.map.blocks, 77u);
   EXPECT_EQ(pipeline.counters().frames, 1u);
+}
+
+TEST_F(PipelineTest, ANewMapBeginsWhereTheCameraWasSeenLast) {
+  Pipeline pipeline(engine_, config_);
+  answer(at(0.05f));
+  process(pipeline, 0);
+  process(pipeline, 100);
+  EXPECT_EQ(pipeline.lost_s(), 0.0);
+  answer(at(5), 0.0f);
+  process(pipeline, 200);
+  EXPECT_EQ(pipeline.lost_s(), 0.0);  // just now
+  process(pipeline, 1700);
+  EXPECT_NEAR(pipeline.lost_s(), 1.5, 1e-9);
+  pipeline.start_new_map();
+  EXPECT_EQ(engine_.resets, 1);
+  EXPECT_EQ(pipeline.lost_s(), 0.0);
+  const FrameResult result = process(pipeline, 1800);
+  EXPECT_EQ(engine_.calls, "pi");
+  EXPECT_EQ(result.state, TrackingState::good);
+  EXPECT_EQ(result.T_map_cam.translation.x, static_cast<double>(0.05f));
+  EXPECT_EQ(pipeline.counters().new_maps, 1u);
+  EXPECT_EQ(pipeline.counters().relocalised, 0u);
+  answer(at(0.06f));
+  EXPECT_EQ(process(pipeline, 1900).state, TrackingState::good);
 }
 
 TEST_F(PipelineTest, TheEngineIsToldHowFarApartFramesAre) {
