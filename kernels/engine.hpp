@@ -131,6 +131,7 @@ struct PlaceResult {
   Status status =
       Status::unavailable;  ///< ok: the frame fits the map at this pose; unavailable: found nothing
   Se3 T_map_cam;            ///< best try, also when it does not fit
+  Se3 T_map_wanted;         ///< the try whose part of the map is to come from the archive
   ViewCheck check;          ///< of that try
   float similarity = 0;     ///< of the most similar keyframe, 0..1
   int32_t keyframes = 0;    ///< in store
@@ -168,6 +169,7 @@ class Engine {
   /// Keeps the last prepared frame as a keyframe when it shows something new. Masked pixels have no say.
   virtual void remember_place(const Se3& T_map_cam) = 0;
   /// Looks for the pose of the last prepared frame: relocalise.tries keyframes and, at attempt 0, the guess.
+  /// When it finds nothing, wanted_groups asks for what one of the tries would show.
   /// @param attempt counts up from 0 while lost: every attempt tries other keyframes
   virtual PlaceResult find_place(const Se3& T_map_cam_guess, int32_t attempt) = 0;
   /// The same from one pose near by (some 20 degrees and 30 cm), without keyframes.
@@ -208,7 +210,8 @@ class Engine {
   virtual void put_away(uint64_t key, uint32_t entry) = 0;
   /// The archive has lost the group: what it held is unknown.
   virtual void forget_group(uint64_t key) = 0;
-  /// Groups of the archive that came into view, or near it, in the last integrated frame. @return how many
+  /// Groups of the archive that came into view, or near it, in the last integrated frame, or would from where
+  /// a lost camera was looked for last. @return how many
   virtual uint32_t wanted_groups(View<ArchivedGroup> groups) const = 0;
 
   /// 255: dynamic. Size of the camera; valid until the next `prepare`.

@@ -18,7 +18,7 @@ FrameResult process_guarded(Pipeline& pipeline, const RgbdFrame& frame, Engine& 
                             BlockArchive* archive) {
   const heap_guard::Scope armed;
   const FrameResult result = pipeline.process(frame);
-  if (archive) archive->step(engine, cast<float>(result.T_map_cam).translation);
+  if (archive) archive->step(engine, pipeline.centre_map());
   return result;
 }
 

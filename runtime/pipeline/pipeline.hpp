@@ -68,6 +68,12 @@ class Pipeline {
   /// pipeline_test
   void start_new_map();
 
+  /// Where the map is needed, metres: around the camera, or where a lost one is looked for.
+  Vec3 centre_map() const {
+    return lost_ && relocaliser_.enabled() ? relocaliser_.last().T_map_wanted.translation
+                                           : cast<float>(T_map_cam_).translation;
+  }
+
   const PipelineCounters& counters() const { return counters_; }
 
  private:

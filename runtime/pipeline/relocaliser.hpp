@@ -23,6 +23,7 @@ class Relocaliser {
 
   /// For each usable frame while lost, after `prepare`.                         test: pipeline_test
   /// @param T_map_cam_last where the camera was when it was lost; tried first
+  /// An attempt for which parts of the map have to come from the archive is made again until they are there.
   /// @return the pose of this frame once it is believed
   std::optional<Se3d> find(const Se3d& T_map_cam_last);
 
@@ -37,6 +38,7 @@ class Relocaliser {
   RelocaliseParams params_;
   PlaceResult last_;
   int32_t attempt_ = 0;      ///< since the loss
+  int32_t waited_ = 0;       ///< frames that this attempt waited for the archive
   int32_t fitted_ = 0;       ///< frames in a row that fitted
   uint32_t remembered_ = 0;  ///< frames offered as keyframes
 };

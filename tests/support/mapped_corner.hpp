@@ -32,9 +32,12 @@ class MappedCorner {
     for (int n = 0; n < 3; ++n) look(Se3d{});
   }
 
-  void look(const Se3d& T_map_cam) {
+  void prepare(const Se3d& T_map_cam) {
     const CornerView view({}, k_, T_map_cam);
     engine->prepare({view.image(view.depth_raw), view.image(view.colour)});
+  }
+  void look(const Se3d& T_map_cam) {
+    prepare(T_map_cam);
     engine->integrate(cast<float>(T_map_cam));
   }
   /// One frame from far outside of the scene, at a wall that nobody saw before: the corner is out of view.

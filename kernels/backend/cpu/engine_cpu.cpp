@@ -194,9 +194,7 @@ class CpuEngine final : public Engine {
   void remember_place(const Se3& T_map_cam) override {
     memory_.relocaliser.remember(prepared_view(), T_map_cam);
   }
-  PlaceResult find_place(const Se3& T_map_cam_guess, int32_t attempt) override {
-    return memory_.relocaliser.find(prepared_view(), memory_.map.view(), T_map_cam_guess, attempt, pool_);
-  }
+  PlaceResult find_place(const Se3& T_map_cam_guess, int32_t attempt) override;
   PlaceResult confirm_place(const Se3& T_map_cam_start) override {
     return memory_.relocaliser.confirm(prepared_view(), memory_.map.view(), T_map_cam_start, pool_);
   }
@@ -278,7 +276,13 @@ class CpuEngine final : public Engine {
   }
   void set_nothing_masked();
   void update_static_depth();
+  FrameGeometry frame_geometry() const {
+    return {memory_.static_depth_m,       k(),
+            params_.depth.min_m,          params_.depth.max_m,
+            params_.integrate.free_max_m, params_.map.truncation_m};
+  }
   VisibleGroupPass visible_pass(const Se3& T_map_cam, const FrameGeometry& geometry) const;
+  bool look_at_groups(const VisibleGroupPass& pass);
   Status list_visible(const VisibleGroupPass& pass, uint32_t& visible_count);
   void merge_free(const VisibleGroupPass& pass, View<const VisibleBlock> visible);
   bool dense() const { return params_.map.free_space == FreeSpace::dense; }
@@ -289,7 +293,7 @@ class CpuEngine final : public Engine {
   const CpuLoops& loops_;
   ThreadPool pool_;
   int32_t frames_ = 0;          ///< integrated, modulo 2^16
-  VisibleGroupPass last_view_;  ///< of the last integrated frame
+  VisibleGroupPass last_view_;  ///< of the last integrated frame, or where a lost camera was looked for
   uint32_t groups_looked_at_ = 0;
   float usual_ = 1.0f;
   float period_s_ = 1.0f / 30.0f;  ///< FrameView::period_s
@@ -603,18 +607,24 @@ VisibleGroupPass CpuEngine::visible_pass(const Se3& T_map_cam, const FrameGeomet
           params_.fetch_m};
 }
 
-/// Lists the visible blocks, in an order that does not depend on threads; makes those that are new.
-Status CpuEngine::list_visible(const VisibleGroupPass& pass, uint32_t& visible_count) {
-  Status status = Status::ok;
+/// What is known of the groups around the view, and which blocks of them the frame says something of.
+/// @return false: there are more groups than the memory of a frame holds
+bool CpuEngine::look_at_groups(const VisibleGroupPass& pass) {
   const uint64_t wanted = static_cast<uint64_t>(pass.groups.x) * static_cast<uint64_t>(pass.groups.y) *
                           static_cast<uint64_t>(pass.groups.z);
   const uint32_t count = static_cast<uint32_t>(std::min<uint64_t>(wanted, memory_.groups.size));
-  if (count < wanted) status = Status::capacity_exhausted;
   groups_looked_at_ = count;
   pool_.for_each((count + kGroupsPerTile - 1) / kGroupsPerTile, [&](uint32_t tile) {
     const uint32_t end = std::min((tile + 1) * kGroupsPerTile, count);
     for (uint32_t g = tile * kGroupsPerTile; g < end; ++g) memory_.groups[g] = loops_.visible_group(pass, g);
   });
+  return count == wanted;
+}
+
+/// Lists the visible blocks, in an order that does not depend on threads; makes those that are new.
+Status CpuEngine::list_visible(const VisibleGroupPass& pass, uint32_t& visible_count) {
+  Status status = look_at_groups(pass) ? Status::ok : Status::capacity_exhausted;
+  const uint32_t count = groups_looked_at_;
   visible_count = 0;
   const auto add = [&](const InsertResult& block, uint32_t kind) {
     if (block.answer != Insert::inserted && block.answer != Insert::existed)
@@ -660,9 +670,7 @@ IntegrateResult CpuEngine::integrate(const Se3& T_world_cam) {
     result.status = Status::capacity_exhausted;
   }
   update_static_depth();
-  const FrameGeometry geometry{memory_.static_depth_m,       k(),
-                               params_.depth.min_m,          params_.depth.max_m,
-                               params_.integrate.free_max_m, params_.map.truncation_m};
+  const FrameGeometry geometry = frame_geometry();
   const VisibleGroupPass visible = visible_pass(T_world_cam, geometry);
   last_view_ = visible;
   const Status listed = list_visible(visible, result.visible_blocks);
@@ -693,6 +701,16 @@ uint32_t CpuEngine::wanted_groups(View<ArchivedGroup> groups) const {
     if (const BlockRef archived = memory_.groups[g].archived; archived != kNoBlock)
       groups[count++] = {pack(last_view_.group_at(g)), payload(archived)};
   return count;
+}
+
+PlaceResult CpuEngine::find_place(const Se3& T_map_cam_guess, int32_t attempt) {
+  const PlaceResult result =
+      memory_.relocaliser.find(prepared_view(), memory_.map.view(), T_map_cam_guess, attempt, pool_);
+  if (result.status == Status::ok || memory_.map.health().archived_groups == 0) return result;
+  update_static_depth();
+  last_view_ = visible_pass(result.T_map_wanted, frame_geometry());
+  look_at_groups(last_view_);
+  return result;
 }
 
 void CpuEngine::look_up(View<const Vec3> points_map_m, View<PointState> states) const {

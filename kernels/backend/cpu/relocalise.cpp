@@ -294,8 +294,17 @@ PlaceResult CpuRelocaliser::find(const PreparedView& frame, const VolumeView& ma
     for (uint32_t i = first; i < std::min(first + per_frame, candidates); ++i)
       tries_[tries++].T_map_cam = keyframes_[order_[i]].T_map_cam;
   }
+  Se3 T_map_wanted = T_map_cam_guess;
+  if (candidates > 0) {
+    // Every round another one of each frame's keyframes.
+    const uint32_t rounds = (candidates + per_frame - 1) / per_frame,
+                   round = static_cast<uint32_t>(attempt) / rounds;
+    const uint32_t first = static_cast<uint32_t>(attempt) % rounds * per_frame;
+    T_map_wanted = keyframes_[order_[std::min(first + round % per_frame, candidates - 1)]].T_map_cam;
+  }
   PlaceResult result = best_of(tries, map, threads);
   result.similarity = similarity;
+  result.T_map_wanted = T_map_wanted;
   return result;
 }
 

@@ -133,6 +133,27 @@ TEST(BlockArchive, AFileThatWasChangedIsReportedAndItsPartOfTheMapForgotten) {
   EXPECT_FALSE(corner_is_away(map));
 }
 
+TEST(BlockArchive, ALostCameraIsFoundInWhatLiesInTheArchive) {
+  const Folder folder;
+  MappedCorner map;
+  for (int n = 0; n < 10; ++n) map.look(Se3d{});
+  map.engine->remember_place({});
+  const auto archive = open(all_goes(folder));
+  map.look_away();
+  ASSERT_TRUE(step_until(*archive, *map.engine, [&] { return corner_is_away(map); }));
+  const Se3 far_off = cast<float>(exp(Twistd{{0, 0, -20}, {0, 0, 0}}));
+  PlaceResult place;
+  map.prepare(Se3d{});
+  place = map.engine->find_place(far_off, 1);
+  ASSERT_NE(place.status, Status::ok) << "what is not in the map cannot be found";
+  EXPECT_TRUE(step_until(*archive, *map.engine, [&] {
+    place = map.engine->find_place(far_off, 1);
+    return place.status == Status::ok;
+  }));
+  EXPECT_LT(norm(place.T_map_cam.translation), 0.01f);
+  EXPECT_GT(archive->counters().restored, 0u);
+}
+
 TEST(BlockArchive, WhatBelongedToAForgottenMapIsErasedAndNeverComesBack) {
   const Folder folder;
   MappedCorner map;
