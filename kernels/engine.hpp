@@ -97,7 +97,8 @@ struct IntegrateResult {
   Status status =
       Status::ok;  ///< capacity_exhausted: the map was full and something was not mapped; it is counted
   MapHealth map;
-  uint32_t visible_blocks = 0;  ///< blocks looked at in this frame
+  uint32_t visible_blocks = 0;        ///< blocks looked at in this frame
+  uint32_t visible_voxel_blocks = 0;  ///< of them, those that take a place of map.pool_blocks
 };
 
 /// How a frame fits the map at a pose, over the cells of its small view (kernels/relocalise). Shares are of

@@ -312,7 +312,9 @@ void RunOutputs::finish(Engine& engine, const FrameSource& source, const Pipelin
     if (const auto cloud = source.truth_cloud(); !cloud.empty() && truth_.anchored())
       tell(write_point_cloud(files_->folder.path("truth_cloud.ply"), in_map_frame(truth_, cloud)));
   }
-  events_.info(last_stamp_, "stop", fmt::format("{} frames", counters.frames));
+  events_.info(last_stamp_, "stop",
+               fmt::format("{} frames; at most {} blocks with voxels in one view", counters.frames,
+                           counters.most_visible_blocks));
   rewrite_report(counters);
   if (!files_) return;
   for (OutputFile* file : {&files_->trajectory.file(), &files_->states.file(), &files_->timing.file()})

@@ -94,10 +94,15 @@ FrameResult Pipeline::process(const RgbdFrame& frame) {
   return result;
 }
 
+void Pipeline::integrate(const Se3& T_map_cam) {
+  const IntegrateResult result = engine_.integrate(T_map_cam);
+  counters_.most_visible_blocks = std::max(counters_.most_visible_blocks, result.visible_voxel_blocks);
+}
+
 /// The first frame is the map: it is taken as static.
 FrameResult Pipeline::start_map(FrameResult result) {
   StopWatch watch;
-  engine_.integrate(cast<float>(result.T_map_cam));
+  integrate(cast<float>(result.T_map_cam));
   result.p_good = 1.0f;
   result.inlier_ratio = 1.0f;
   result.ms.integrate_ms = watch.lap_ms();
@@ -143,8 +148,7 @@ FrameResult Pipeline::track_and_map(FrameResult result) {
     std::copy_n(refined.covariance, 21, result.covariance);
     result.T_map_cam = cast<double>(refined.T_world_cam);
   }
-  if (result.state == TrackingState::good)
-    engine_.integrate(refined.T_world_cam);  // a poor pose freezes the map
+  if (result.state == TrackingState::good) integrate(refined.T_world_cam);  // a poor pose freezes the map
   result.ms.integrate_ms = watch.lap_ms();
   return result;
 }

@@ -39,9 +39,10 @@ struct FrameResult {
 struct PipelineCounters {
   uint32_t frames = 0;  ///< processed, bad ones included
   uint32_t bad_frames = 0;
-  uint32_t lost_frames = 0;  ///< bad ones included
-  uint32_t relocalised = 0;  ///< returns from lost
-  uint32_t new_maps = 0;     ///< started because the camera was not found again
+  uint32_t lost_frames = 0;          ///< bad ones included
+  uint32_t relocalised = 0;          ///< returns from lost
+  uint32_t most_visible_blocks = 0;  ///< with voxels, in one frame: the least that map.pool_blocks must hold
+  uint32_t new_maps = 0;             ///< started because the camera was not found again
 };
 
 /// @thread real-time thread; `process` does not allocate, lock, touch files or throw
@@ -77,6 +78,7 @@ class Pipeline {
   const PipelineCounters& counters() const { return counters_; }
 
  private:
+  void integrate(const Se3& T_map_cam);
   FrameResult start_map(FrameResult result);
   FrameResult track_and_map(FrameResult result);
   TrackResult first_registration(const PosePrior& prior);

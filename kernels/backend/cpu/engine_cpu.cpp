@@ -686,6 +686,7 @@ IntegrateResult CpuEngine::integrate(const Se3& T_world_cam) {
                            dense()};
   frames_ = (frames_ + 1) & 0xffff;
   const View<const VisibleBlock> blocks{memory_.visible.data, result.visible_blocks};
+  for (const VisibleBlock block : blocks) result.visible_voxel_blocks += !block.partly();
   pool_.for_each((blocks.size + kBlocksPerTile - 1) / kBlocksPerTile, [&](uint32_t tile) {
     const uint32_t first = tile * kBlocksPerTile;
     loops_.integrate(pass, {blocks.data + first, std::min(kBlocksPerTile, blocks.size - first)});
