@@ -118,6 +118,7 @@ struct ViewCheck {
 struct ArchivedGroup {
   uint64_t key;
   uint32_t entry;  ///< as put_away was told
+  bool in_view;    ///< else it is only near it
 };
 
 /// What the map knows of a point, by the voxel next to it.
@@ -204,15 +205,15 @@ class Engine {
   virtual Status read_place(View<const uint8_t> record) = 0;
 
   /// Groups with blocks that the last integrated frame does not come near, the farthest from `centre_map`
-  /// first. @return how many
-  virtual uint32_t farthest_groups(Vec3 centre_map, View<uint64_t> keys) = 0;
+  /// first. @param near_view_too those that it comes near but does not see as well  @return how many
+  virtual uint32_t farthest_groups(Vec3 centre_map, View<uint64_t> keys, bool near_view_too) = 0;
   /// Frees the blocks of a group that was written to the archive; until read_group brings it back the map
   /// knows nothing of it, and frames leave it as it is.
   virtual void put_away(uint64_t key, uint32_t entry) = 0;
   /// The archive has lost the group: what it held is unknown.
   virtual void forget_group(uint64_t key) = 0;
   /// Groups of the archive that came into view, or near it, in the last integrated frame, or would from where
-  /// a lost camera was looked for last. @return how many
+  /// a lost camera was looked for last; first those in view. @return how many
   virtual uint32_t wanted_groups(View<ArchivedGroup> groups) const = 0;
 
   /// 255: dynamic. Size of the camera; valid until the next `prepare`.

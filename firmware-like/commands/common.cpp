@@ -73,7 +73,7 @@ FrameSlot::FrameSlot(const SourceInfo& info) {
 namespace {
 
 /// Of map.high_water: between them there is room for what comes while the archive writes.
-constexpr float kArchiveBelow = 0.9f;
+constexpr float kArchiveBelow = 0.85f, kArchiveFull = 0.95f;
 
 }  // namespace
 
@@ -82,6 +82,7 @@ BlockArchive::Options archive_options(const Config& config) {
   options.dir = config.archive.dir;
   options.max_bytes = static_cast<uint64_t>(config.archive.max_bytes);
   options.keep_below = kArchiveBelow * config.map.high_water;
+  options.full = kArchiveFull * config.map.high_water;
   return options;
 }
 

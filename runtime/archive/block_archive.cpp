@@ -22,7 +22,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr uint32_t kMostWantedPerFrame = 16;
-constexpr uint32_t kMostPutAwayPerFrame = 8;
+constexpr uint32_t kMostPutAwayPerFrame = 16;
+constexpr float kRoomAhead = 0.05f;          ///< of the pool, for what is only near the view
 constexpr uint32_t kFarAtOnce = 256;         ///< found by one walk over the table
 constexpr uint32_t kEntriesLookedAt = 1024;  ///< for those to be erased, in one frame
 constexpr size_t kMostFolderLetters = 400;
@@ -191,7 +192,10 @@ void BlockArchive::stored(Engine& engine, const Slot& slot) {
 
 /// @return true: its file is of no more use
 bool BlockArchive::loaded(Engine& engine, const Slot& slot) {
-  const Status status = slot.done ? engine.read_group({slot.record.data(), slot.bytes}) : Status::unavailable;
+  Status status = Status::unavailable;
+  if (slot.done)
+    status = engine.map_health().fill > options_.full ? Status::capacity_exhausted
+                                                      : engine.read_group({slot.record.data(), slot.bytes});
   if (status == Status::capacity_exhausted) {
     ++counters_.no_room;
     entries_[slot.entry].state = EntryState::stored;
@@ -231,7 +235,9 @@ bool BlockArchive::send(Order order, uint32_t entry) {
 
 void BlockArchive::fetch_wanted(Engine& engine) {
   const uint32_t count = engine.wanted_groups({wanted_.data(), kMostWantedPerFrame});
+  const bool room_ahead = engine.map_health().fill < options_.keep_below - kRoomAhead;
   for (uint32_t i = 0; i < count; ++i) {
+    if (!wanted_[i].in_view && !room_ahead) continue;
     Entry& entry = entries_[wanted_[i].entry];
     const bool is_here = entry.state == EntryState::stored && entry.key == wanted_[i].key;
     if (is_here && send(Order::load, wanted_[i].entry)) entry.state = EntryState::loading;
@@ -244,11 +250,14 @@ void BlockArchive::put_away_far(Engine& engine, Vec3 centre_map) {
     return;
   }
   if (far_left_ == 0) {
-    far_left_ = engine.farthest_groups(centre_map, {far_.data(), kFarAtOnce});
+    far_left_ = engine.farthest_groups(centre_map, {far_.data(), kFarAtOnce}, false);
+    near_view_ = far_left_ == 0;
+    if (near_view_) far_left_ = engine.farthest_groups(centre_map, {far_.data(), kFarAtOnce}, true);
     std::reverse(far_.begin(), far_.begin() + far_left_);
   }
   for (uint32_t n = 0; n < kMostPutAwayPerFrame && far_left_ > 0; ++n)
     if (put_away(engine, far_[far_left_ - 1])) --far_left_;
+  if (near_view_) far_left_ = 0;  // the next frame may see them
 }
 
 /// @return false: not now, all slots are on their way

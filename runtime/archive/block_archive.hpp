@@ -39,6 +39,7 @@ class BlockArchive {
     uint64_t max_bytes = 0;  ///< of all files together
     uint32_t max_groups = 65536;
     float keep_below = 0.9f;  ///< fill of the map (MapHealth::fill) above which groups go
+    float full = 0.95f;       ///< fill above which nothing comes back: the map would drop something else
     uint32_t slots = 32;      ///< groups on their way; each takes kMaxGroupRecordBytes
   };
 
@@ -127,6 +128,7 @@ class BlockArchive {
   std::vector<uint64_t> far_;  ///< to be put away, the nearest first
   std::vector<ArchivedGroup> wanted_;
   uint32_t far_left_ = 0;
+  bool near_view_ = false;  ///< `far_` is near the view: there is nothing farther
   std::atomic<uint32_t> map_{0};  ///< counts the maps that were forgotten
   uint32_t doomed_ = 0;           ///< entries
   uint32_t doomed_from_ = 0;      ///< where the search for them goes on

@@ -9,6 +9,7 @@ import json
 import math
 import os
 import pathlib
+import re
 import resource
 import shutil
 import signal
@@ -331,6 +332,31 @@ class Outputs(Case):
         done = stillmap("run", "--source", SMALL, "--max-frames", "3", *LITTLE, cwd=self.folder)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(list(self.folder.iterdir()), [])
+
+
+class BoundedMap(Case):
+    def test_a_pool_of_one_and_a_half_views_is_enough_with_an_archive(self):
+        source = "synthetic:loop,size=160x120,seconds=10"
+        always = ["--set", "map.voxel_m=0.02", "--set", "map.free_space=hierarchical", "--set", "record.snapshots=0"]
+        whole, small = self.folder / "whole", self.folder / "small"
+        stillmap("run", "--source", source, *always, "--out", whole)
+        stop = re.search(r"at most (\d+) blocks with voxels in one view", (whole / "events.log").read_text())
+        pool = int(stop[1]) * 3 // 2
+        blocks = json.loads((whole / "report.json").read_text())["map"]["blocks"]
+        self.assertLess(pool, 0.6 * blocks)
+        done = stillmap("run", "--source", source, *always, "--out", small, "--set", f"map.pool_blocks={pool}",
+                        "--set", f"archive.dir={self.folder / 'archive'}")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        report = json.loads((small / "report.json").read_text())
+        self.assertEqual((report["lost_frames"], report["heap_allocations_in_loop"]), (0, 0))
+        self.assertGreater(report["map"]["archived"], 0)
+        # When a group comes back depends on the disk, so that the runs need not be the same to the bit.
+        for a, b in zip(read_trajectory(whole / "trajectory.txt"), read_trajectory(small / "trajectory.txt")):
+            self.assertLess(math.dist(a[1:4], b[1:4]), 0.01)
+        curve = self.folder / "curve.csv"
+        done = stillmap("evaluate", "model", "--truth", whole / "mesh.ply", "--mesh", small / "mesh.ply", "--csv", curve)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertGreater(float(read_csv(curve)[6][1]), 0.97)  # within 1 cm
 
 
 class SavedMaps(Case):

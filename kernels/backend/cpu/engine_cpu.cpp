@@ -212,10 +212,9 @@ class CpuEngine final : public Engine {
   uint32_t write_group(uint64_t key, View<uint8_t> record) const override {
     return memory_.map.write_group(key, record);
   }
-  uint32_t farthest_groups(Vec3 centre_map, View<uint64_t> keys) override {
-    const bool has_view = groups_looked_at_ > 0;  // something was integrated
-    return memory_.map.farthest_groups(
-        centre_map, keys, [&](BlockKey key) { return has_view && last_view_.comes_into_view(unpack(key)); });
+  uint32_t farthest_groups(Vec3 centre_map, View<uint64_t> keys, bool near_view_too) override {
+    return memory_.map.farthest_groups(centre_map, keys,
+                                       InView(*this, near_view_too ? 0.0f : params_.fetch_m));
   }
   void put_away(uint64_t key, uint32_t entry) override { memory_.map.put_away(key, entry); }
   void forget_group(uint64_t key) override { memory_.map.forget_group(key); }
@@ -282,6 +281,16 @@ class CpuEngine final : public Engine {
             params_.integrate.free_max_m, params_.map.truncation_m};
   }
   VisibleGroupPass visible_pass(const Se3& T_map_cam, const FrameGeometry& geometry) const;
+  /// Of a group: whether the last frame saw it, or came so near it.
+  struct InView {
+    VisibleGroupPass view;
+    bool any;
+    InView(const CpuEngine& engine, float margin_m)
+        : view(engine.last_view_), any(engine.groups_looked_at_ > 0) {
+      view.margin_m = margin_m;
+    }
+    bool operator()(BlockKey key) const { return any && view.comes_into_view(unpack(key)); }
+  };
   bool look_at_groups(const VisibleGroupPass& pass);
   Status list_visible(const VisibleGroupPass& pass, uint32_t& visible_count);
   void merge_free(const VisibleGroupPass& pass, View<const VisibleBlock> visible);
@@ -666,7 +675,7 @@ void CpuEngine::merge_free(const VisibleGroupPass& pass, View<const VisibleBlock
 IntegrateResult CpuEngine::integrate(const Se3& T_world_cam) {
   IntegrateResult result;
   if (memory_.map.above_high_water()) {
-    memory_.map.drop_farthest(T_world_cam.translation);
+    memory_.map.drop_farthest(T_world_cam.translation, InView(*this, 0.0f));
     result.status = Status::capacity_exhausted;
   }
   update_static_depth();
@@ -697,10 +706,14 @@ IntegrateResult CpuEngine::integrate(const Se3& T_world_cam) {
 }
 
 uint32_t CpuEngine::wanted_groups(View<ArchivedGroup> groups) const {
+  const InView in_view(*this, 0.0f);
   uint32_t count = 0;
-  for (uint32_t g = 0; g < groups_looked_at_ && count < groups.size; ++g)
-    if (const BlockRef archived = memory_.groups[g].archived; archived != kNoBlock)
-      groups[count++] = {pack(last_view_.group_at(g)), payload(archived)};
+  for (const bool seen : {true, false})
+    for (uint32_t g = 0; g < groups_looked_at_ && count < groups.size; ++g) {
+      const BlockRef archived = memory_.groups[g].archived;
+      const BlockKey key = pack(last_view_.group_at(g));
+      if (archived != kNoBlock && in_view(key) == seen) groups[count++] = {key, payload(archived), seen};
+    }
   return count;
 }
 

@@ -12,7 +12,8 @@ namespace {
 // Surfaces fill a third of the groups they are in; the rest is for the rim of what was seen.
 constexpr uint64_t kBlocksPerGroup = 4;
 constexpr uint64_t kFewestGroups = 1024;
-constexpr uint64_t kBlocksPerPartly = 2;
+/// The rim of a view runs through the middle of rooms: more blocks than surfaces have, of 80 bytes each.
+constexpr uint64_t kPartlyPerBlock = 2;
 /// Groups that are free throughout, or in the archive, take a slot and nothing else.
 constexpr uint64_t kSlotsPerBlock = 2;
 constexpr uint64_t kFewestSlots = 16;
@@ -70,7 +71,7 @@ void MapStorage::carve(Arena& arena, const MapParams& params, int32_t weight_cap
   const uint64_t blocks = static_cast<uint64_t>(params.pool_blocks);
   const uint64_t groups = std::max(blocks / kBlocksPerGroup, std::min(blocks, kFewestGroups));
   const uint64_t partly =
-      params.free_space == FreeSpace::hierarchical ? blocks / kBlocksPerPartly + 1 : uint64_t{0};
+      params.free_space == FreeSpace::hierarchical ? blocks * kPartlyPerBlock : uint64_t{0};
   const uint32_t slots = table_slots(blocks);
   view_.voxel_m = params.voxel_m;
   view_.truncation_m = params.truncation_m;
@@ -425,7 +426,7 @@ uint32_t MapStorage::order_groups() {
   uint32_t count = 0;
   for (uint32_t slot = 0; slot < view_.table.keys.size; ++slot)
     if (view_.table.keys[slot] != kEmptyKey && view_.table.blocks[slot] != kNoBlock)
-      order_[count++] = {view_.table.keys[slot], view_.table.blocks[slot]};
+      order_[count++] = {view_.table.keys[slot], view_.table.blocks[slot], false};
   return count;
 }
 
@@ -451,18 +452,19 @@ void MapStorage::give_up(const TableEntry& group) {
   view_.group_pool.give_back(group.ref);
 }
 
-void MapStorage::drop_farthest(Vec3 centre_map) {
+void MapStorage::drop_ordered(Vec3 centre_map, uint32_t groups) {
   const auto room = [](uint32_t used, uint32_t capacity) { return used <= capacity - capacity / 10; };
-  uint32_t groups = order_groups();
-  // What goes first stands last: groups with blocks, unless it is the table that is full, and of those the
-  // farthest. Ties by key: the same groups go whatever their order in the table.
+  // What goes first stands last: groups with blocks, unless it is the table that is full; of those what is
+  // out of view, and of that the farthest. Ties by key: the same groups go whatever their order in the table.
   const bool any_kind = !room(groups, most_entries(view_.table.keys.size));
-  std::sort(order_.begin(), order_.begin() + groups, [&](const TableEntry& a, const TableEntry& b) {
+  const auto nearer = [&](const TableEntry& a, const TableEntry& b) {
     if (!any_kind && has_id(a.ref) != has_id(b.ref)) return has_id(b.ref);
+    if (a.in_view != b.in_view) return a.in_view;
     const float da = distance2(centre_map, a.key, view_.voxel_m),
                 db = distance2(centre_map, b.key, view_.voxel_m);
     return da != db ? da < db : a.key < b.key;
-  });
+  };
+  std::sort(order_.begin(), order_.begin() + groups, nearer);
   while (groups > 0 &&
          !(room(used_[0], view_.pool.free_ids.size) && room(used_[1], view_.group_pool.free_ids.size) &&
            room(used_[2], view_.partly_pool.free_ids.size) &&

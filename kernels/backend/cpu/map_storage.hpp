@@ -64,14 +64,21 @@ class MapStorage {
   float fill() const;
   /// True when the pool of voxels, of groups or the table is fuller than map.high_water.
   bool above_high_water() const;
-  /// Gives up the groups of blocks farthest from `centre_map` until a tenth of each pool is free. Counted.
-  void drop_farthest(Vec3 centre_map);
+  /// Gives up groups of blocks until a tenth of each pool is free: first those that are not `in_view`, the
+  /// farthest from `centre_map` before nearer ones. Counted.
+  template <class InView>
+  void drop_farthest(Vec3 centre_map, const InView& in_view) {
+    const uint32_t groups = order_groups();
+    for (uint32_t i = 0; i < groups; ++i) order_[i].in_view = in_view(order_[i].key);
+    drop_ordered(centre_map, groups);
+  }
 
  private:
   /// A group as drop_farthest moves it about.
   struct TableEntry {
     BlockKey key;
     BlockRef ref;
+    bool in_view;
   };
 
   /// @return null when there is no room
@@ -81,6 +88,7 @@ class MapStorage {
   bool has_room_for(const GroupRecordHead& head) const;
   void read_block(const GroupRecordHead& head, int32_t index, const uint8_t*& from, BlockRef& ref);
   uint32_t order_groups();
+  void drop_ordered(Vec3 centre_map, uint32_t groups);
   uint32_t farthest_of_order(Vec3 centre_map, uint32_t count, View<BlockKey> keys);
   void remove(BlockRef block);
   void give_up(const TableEntry& group);

@@ -55,7 +55,7 @@ class ScriptedEngine : public Engine {
   uint32_t list_groups(View<uint64_t>) const override { return 0; }
   uint32_t write_group(uint64_t, View<uint8_t>) const override { return 0; }
   Status read_group(View<const uint8_t>) override { return Status::unavailable; }
-  uint32_t farthest_groups(Vec3, View<uint64_t>) override { return 0; }
+  uint32_t farthest_groups(Vec3, View<uint64_t>, bool) override { return 0; }
   void put_away(uint64_t, uint32_t) override {}
   void forget_group(uint64_t) override {}
   uint32_t wanted_groups(View<ArchivedGroup>) const override { return 0; }

@@ -12,6 +12,8 @@
 namespace stillmap {
 namespace {
 
+constexpr auto kNothingInView = [](BlockKey) { return false; };
+
 /// A MapStorage with its memory.
 class Storage {
  public:
@@ -130,7 +132,7 @@ TEST(MapStorage, DropFarthestKeepsTheNearestGroupsAndMakesATenthFree) {
   MapStorage& map = storage.map;
   const std::vector<BlockKey> keys = fill(map, 1000, 3);
   const Vec3 centre = {0.2f, -0.1f, 0.3f};
-  map.drop_farthest(centre);
+  map.drop_farthest(centre, kNothingInView);
   EXPECT_LE(map.health().blocks, 900u);
   EXPECT_GT(map.health().blocks, 900u - kGroupBlocks);
   EXPECT_EQ(map.health().dropped_blocks, 1000u - map.health().blocks);
@@ -149,12 +151,30 @@ TEST(MapStorage, DropFarthestKeepsTheNearestGroupsAndMakesATenthFree) {
   EXPECT_LE(farthest_kept_m, nearest_dropped_m + 1e-6f);
 }
 
+TEST(MapStorage, DropFarthestKeepsWhatIsInViewHoweverFar) {
+  Storage storage(params_of(1000));
+  MapStorage& map = storage.map;
+  const std::vector<BlockKey> keys = fill(map, 1000, 3);
+  const Vec3 centre = {0.2f, -0.1f, 0.3f};
+  const auto in_view = [&](BlockKey group) { return unpack(group).x > 0; };  // about half of them
+  map.drop_farthest(centre, in_view);
+  EXPECT_LE(map.health().blocks, 900u);
+  uint32_t kept_out_of_view = 0;
+  for (const BlockKey key : keys) {
+    const bool kept = map.view().voxels_of(unpack(key)) != kNoBlock;
+    const bool seen = in_view(pack(group_of_block(unpack(key))));
+    EXPECT_TRUE(kept || !seen);
+    kept_out_of_view += kept && !seen;
+  }
+  EXPECT_GT(kept_out_of_view, 100u);
+}
+
 TEST(MapStorage, DroppedBlocksCanBeHadAgain) {
   Storage storage(params_of(1000));
   MapStorage& map = storage.map;
   fill(map, 1000, 4);
   EXPECT_EQ(map.insert(pack({50, 0, 0})).answer, Insert::pool_empty);
-  map.drop_farthest({});
+  map.drop_farthest({}, kNothingInView);
   const auto room = static_cast<int32_t>(1000 - map.health().blocks);
   std::set<BlockId> ids;
   for (int32_t i = 0; i < room; ++i) {
@@ -175,7 +195,7 @@ TEST(MapStorage, WhatIsDroppedDoesNotDependOnTheOrderOfTheBlocks) {
     for (const uint32_t seed : {5u, 6u}) {
       Storage storage(params_of(static_cast<int32_t>(count)));
       fill(storage.map, count, seed);
-      storage.map.drop_farthest({});
+      storage.map.drop_farthest({}, kNothingInView);
       kept[seed - 5] = keys_of(storage.map);
     }
     EXPECT_LE(kept[0].size(), count - count / 10);
@@ -186,7 +206,7 @@ TEST(MapStorage, WhatIsDroppedDoesNotDependOnTheOrderOfTheBlocks) {
 TEST(MapStorage, NothingIsDroppedWhereThereIsRoom) {
   Storage storage(params_of(1000));
   fill(storage.map, 900, 7);
-  storage.map.drop_farthest({100, 100, 100});
+  storage.map.drop_farthest({100, 100, 100}, kNothingInView);
   EXPECT_EQ(storage.map.health().blocks, 900u);
   EXPECT_EQ(storage.map.health().dropped_blocks, 0u);
 }
@@ -200,7 +220,7 @@ TEST(MapStorage, StaysConsistentOverManyDrops) {
   for (int round = 0; round < 100; ++round) {
     for (int i = 0; i < 50; ++i)
       map.insert(pack({coordinate(random), coordinate(random), coordinate(random)}));
-    if (map.above_high_water()) map.drop_farthest({0.08f * static_cast<float>(coordinate(random)), 0, 0});
+    if (map.above_high_water()) map.drop_farthest({0.08f * static_cast<float>(coordinate(random)), 0, 0}, kNothingInView);
     const std::set<BlockKey> keys = keys_of(map);
     ASSERT_EQ(keys.size(), map.health().blocks);
     for (const BlockKey key : keys) {
