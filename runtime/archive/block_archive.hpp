@@ -128,7 +128,7 @@ class BlockArchive {
   std::vector<uint64_t> far_;  ///< to be put away, the nearest first
   std::vector<ArchivedGroup> wanted_;
   uint32_t far_left_ = 0;
-  bool near_view_ = false;  ///< `far_` is near the view: there is nothing farther
+  bool near_view_ = false;        ///< `far_` is near the view: there is nothing farther
   std::atomic<uint32_t> map_{0};  ///< counts the maps that were forgotten
   uint32_t doomed_ = 0;           ///< entries
   uint32_t doomed_from_ = 0;      ///< where the search for them goes on

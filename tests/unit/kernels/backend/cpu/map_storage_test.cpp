@@ -220,7 +220,8 @@ TEST(MapStorage, StaysConsistentOverManyDrops) {
   for (int round = 0; round < 100; ++round) {
     for (int i = 0; i < 50; ++i)
       map.insert(pack({coordinate(random), coordinate(random), coordinate(random)}));
-    if (map.above_high_water()) map.drop_farthest({0.08f * static_cast<float>(coordinate(random)), 0, 0}, kNothingInView);
+    if (map.above_high_water())
+      map.drop_farthest({0.08f * static_cast<float>(coordinate(random)), 0, 0}, kNothingInView);
     const std::set<BlockKey> keys = keys_of(map);
     ASSERT_EQ(keys.size(), map.health().blocks);
     for (const BlockKey key : keys) {
