@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -22,6 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr uint32_t kMostWantedPerFrame = 16;
+constexpr uint32_t kPauseFrames = 100;  ///< after a write that failed
 constexpr uint32_t kMostPutAwayPerFrame = 16;
 constexpr float kRoomAhead = 0.05f;          ///< of the pool, for what is only near the view
 constexpr uint32_t kFarAtOnce = 256;         ///< found by one walk over the table
@@ -82,6 +84,29 @@ bool read_record(const File& file, uint8_t* record, uint32_t bytes) {
          sum == checksum(record, bytes);
 }
 
+constexpr const char* kLockName = "lock";
+
+/// @return the file that shows that somebody uses `folder`, held; -1: somebody else holds it, or it is not
+/// there
+int take_lock(const std::string& folder, int flags) {
+  const int file = ::open((folder + "/" + kLockName).c_str(), O_RDWR | O_CLOEXEC | flags, 0644);
+  if (file < 0 || ::flock(file, LOCK_EX | LOCK_NB) == 0) return file;
+  ::close(file);
+  return -1;
+}
+
+/// What runs left that ended without a chance to tidy up.
+void remove_abandoned(const std::string& dir) {
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(dir, error)) {
+    if (entry.path().filename().string().rfind("run-", 0) != 0) continue;
+    const int lock = take_lock(entry.path().string(), 0);
+    if (lock < 0) continue;
+    fs::remove_all(entry.path(), error);
+    ::close(lock);
+  }
+}
+
 /// A folder that no other run uses.
 std::string folder_below(const std::string& dir) {
   return (fs::path(dir) / fmt::format("run-{}", ::getpid())).string();
@@ -104,12 +129,16 @@ Result<std::unique_ptr<BlockArchive>> BlockArchive::open(const Options& options)
   if (error)
     return Error{fmt::format("archive.dir: {} cannot be made: {}; name a folder that can be written, or none",
                              folder, error.message())};
-  return std::unique_ptr<BlockArchive>(new BlockArchive(options, folder));
+  const int lock = take_lock(folder, O_CREAT);
+  if (lock < 0) return Error{fmt::format("archive.dir: {}/{} cannot be written", folder, kLockName)};
+  remove_abandoned(options.dir);
+  return std::unique_ptr<BlockArchive>(new BlockArchive(options, folder, lock));
 }
 
-BlockArchive::BlockArchive(const Options& options, std::string folder)
+BlockArchive::BlockArchive(const Options& options, std::string folder, int lock)
     : options_(options),
       folder_(std::move(folder)),
+      lock_(lock),
       entries_(options.max_groups),
       free_entries_(options.max_groups),
       slots_(options.slots),
@@ -129,6 +158,7 @@ BlockArchive::~BlockArchive() {
   worker_.join();
   std::error_code ignored;
   fs::remove_all(folder_, ignored);
+  ::close(lock_);
 }
 
 // --- the loop
@@ -185,9 +215,12 @@ void BlockArchive::stored(Engine& engine, const Slot& slot) {
     entries_[slot.entry].state = EntryState::stored;
     return;
   }
+  // The record is still here: back into the map with it, and no further try for a while.
   ++counters_.failed;
-  engine.forget_group(slot.key);
+  if (engine.read_group({slot.record.data(), slot.bytes}) != Status::ok) engine.forget_group(slot.key);
   release(slot.entry);
+  pause_ = kPauseFrames;
+  far_left_ = 0;
 }
 
 /// @return true: its file is of no more use
@@ -247,6 +280,10 @@ void BlockArchive::fetch_wanted(Engine& engine) {
 void BlockArchive::put_away_far(Engine& engine, Vec3 centre_map) {
   if (engine.map_health().fill <= options_.keep_below) {
     far_left_ = 0;
+    return;
+  }
+  if (pause_ > 0) {
+    --pause_;
     return;
   }
   if (far_left_ == 0) {

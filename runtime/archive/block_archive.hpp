@@ -28,7 +28,8 @@ struct ArchiveCounters {
 };
 
 /// Keeps the fullest pool of a map below `keep_below`: what is farthest goes first, and comes back when it
-/// comes into view. One file a group in a folder of its own below `dir`, which is gone with the archive.
+/// comes into view. One file a group in a folder of its own below `dir`, which is gone with the archive, or,
+/// after a crash, with the next one that is opened in `dir`.
 ///
 /// The loop calls `step` once a frame; it copies at most a few groups to or from slots of memory taken at
 /// boot, and neither waits nor touches files. A background thread does.
@@ -96,7 +97,7 @@ class BlockArchive {
     std::vector<uint8_t> record;
   };
 
-  BlockArchive(const Options& options, std::string folder);
+  BlockArchive(const Options& options, std::string folder, int lock);
 
   std::string settle(Engine& engine);
   void take_answer(Engine& engine, uint32_t number);
@@ -121,6 +122,7 @@ class BlockArchive {
 
   const Options options_;
   const std::string folder_;
+  const int lock_;  ///< file that shows others that the folder is in use
   std::vector<Entry> entries_;
   std::vector<uint32_t> free_entries_;
   std::vector<Slot> slots_;
@@ -128,6 +130,7 @@ class BlockArchive {
   std::vector<uint64_t> far_;  ///< to be put away, the nearest first
   std::vector<ArchivedGroup> wanted_;
   uint32_t far_left_ = 0;
+  uint32_t pause_ = 0;            ///< frames until something is put away again
   bool near_view_ = false;        ///< `far_` is near the view: there is nothing farther
   std::atomic<uint32_t> map_{0};  ///< counts the maps that were forgotten
   uint32_t doomed_ = 0;           ///< entries

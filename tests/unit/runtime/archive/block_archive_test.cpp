@@ -10,6 +10,7 @@
 
 #include "runtime/core/bounded_queue.hpp"
 #include "tests/support/mapped_corner.hpp"
+#include "tests/unit/runtime/record/file_size_limit.hpp"
 
 namespace stillmap {
 namespace {
@@ -133,6 +134,30 @@ TEST(BlockArchive, AFileThatWasChangedIsReportedAndItsPartOfTheMapForgotten) {
   EXPECT_FALSE(corner_is_away(map));
 }
 
+TEST(BlockArchive, OnAFullDiskNothingIsLostAndItIsTriedAgainLater) {
+  const Folder folder;
+  MappedCorner map;
+  const std::vector<PointState> corner = map.states();
+  const auto archive = open(all_goes(folder));
+  map.look_away();
+  {
+    const test::FileSizeLimit limit(100);
+    ASSERT_TRUE(step_until(*archive, *map.engine, [&] {
+      return archive->counters().failed > 0 && archive->counters().groups == 0;
+    }));
+    EXPECT_EQ(archive->counters().stored, 0u);
+    EXPECT_LT(archive->counters().failed, 40u) << "it should wait a while";
+    EXPECT_NE(archive->last_error().find("cannot be written"), std::string::npos) << archive->last_error();
+    EXPECT_EQ(map.states(), corner);
+    EXPECT_TRUE(folder.groups().empty());
+  }
+  EXPECT_TRUE(step_until(*archive, *map.engine, [&] { return corner_is_away(map); }));
+  EXPECT_TRUE(step_until(*archive, *map.engine, [&] {
+    map.look(Se3d{});
+    return map.states() == corner;
+  }));
+}
+
 TEST(BlockArchive, ALostCameraIsFoundInWhatLiesInTheArchive) {
   const Folder folder;
   MappedCorner map;
@@ -178,6 +203,26 @@ TEST(BlockArchive, WhatBelongedToAForgottenMapIsErasedAndNeverComesBack) {
   }));
   EXPECT_EQ(archive->counters().failed, 0u);
   for (const fs::path& file : folder.groups()) EXPECT_EQ(file.filename().string()[0], '1') << file;
+}
+
+TEST(BlockArchive, WhatACrashedRunLeftIsRemovedAndWhatIsInUseIsNot) {
+  const Folder folder;
+  const fs::path crashed = fs::path(folder.str()) / "run-1", foreign = fs::path(folder.str()) / "run-away";
+  for (const fs::path& path : {crashed, foreign}) fs::create_directories(path);
+  for (const char* name : {"lock", "0-1.group"}) std::ofstream(crashed / name) << "x";
+  std::ofstream(foreign / "diary.txt") << "x";  // has no lock: is none of ours
+  const auto first = open(all_goes(folder));
+  EXPECT_FALSE(fs::exists(crashed));
+  EXPECT_TRUE(fs::exists(foreign / "diary.txt"));
+  const fs::path in_use = fs::path(folder.str()) / ("run-" + std::to_string(::getpid()));
+  EXPECT_TRUE(fs::exists(in_use / "lock"));
+  const fs::path other = fs::path(folder.str()) / "run-2";  // another process's, as this one sees it
+  fs::create_directories(other);
+  fs::create_hard_link(in_use / "lock", other / "lock");
+  fs::rename(in_use, fs::path(folder.str()) / "run-3");
+  const auto second = open(all_goes(folder));
+  EXPECT_TRUE(fs::exists(other / "lock"));
+  EXPECT_TRUE(fs::exists(fs::path(folder.str()) / "run-3" / "lock"));
 }
 
 TEST(BlockArchive, ItsFilesAreGoneWithIt) {
