@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-
 #include "config/engine_params.hpp"
 #include "kernels/base/view.hpp"
 

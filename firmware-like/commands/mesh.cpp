@@ -20,7 +20,7 @@ struct MeshOptions {
 
 /// An engine with room for what the file holds; no camera is needed, so it has the smallest.
 EngineParams params_for(const MapFile& file, int32_t threads) {
-  constexpr uint64_t kBlocksPerGroup = 4, kPartlyPerBlock = 2, kSpare = 1024;  // of the engine's pools
+  constexpr uint64_t kBlocksPerGroup = 4, kPartlyPerBlock = 1, kSpare = 1024;  // of the engine's pools
   const MapContents& has = file.contents();
   const uint64_t blocks = kSpare + std::max({has.voxel_blocks, kBlocksPerGroup * has.groups,
                                              has.partly_blocks / kPartlyPerBlock});

@@ -12,8 +12,9 @@ namespace {
 // Surfaces fill a third of the groups they are in; the rest is for the rim of what was seen.
 constexpr uint64_t kBlocksPerGroup = 4;
 constexpr uint64_t kFewestGroups = 1024;
-/// The rim of a view runs through the middle of rooms: more blocks than surfaces have, of 80 bytes each.
-constexpr uint64_t kPartlyPerBlock = 2;
+/// The rim of a view runs through the middle of rooms: nearly as many blocks as surfaces have, of 80 bytes
+/// each.
+constexpr uint64_t kPartlyPerBlock = 1;
 /// Groups that are free throughout, or in the archive, take a slot and nothing else.
 constexpr uint64_t kSlotsPerBlock = 2;
 constexpr uint64_t kFewestSlots = 16;

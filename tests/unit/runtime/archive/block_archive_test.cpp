@@ -142,11 +142,14 @@ TEST(BlockArchive, OnAFullDiskNothingIsLostAndItIsTriedAgainLater) {
   map.look_away();
   {
     const test::FileSizeLimit limit(100);
+    uint64_t frames = 0;
     ASSERT_TRUE(step_until(*archive, *map.engine, [&] {
+      ++frames;
       return archive->counters().failed > 0 && archive->counters().groups == 0;
     }));
+    // A burst before the first answer, and then one in a hundred frames.
+    EXPECT_LE(archive->counters().failed, 32 * (1 + frames / 100)) << "it should wait a while";
     EXPECT_EQ(archive->counters().stored, 0u);
-    EXPECT_LT(archive->counters().failed, 40u) << "it should wait a while";
     EXPECT_NE(archive->last_error().find("cannot be written"), std::string::npos) << archive->last_error();
     EXPECT_EQ(map.states(), corner);
     EXPECT_TRUE(folder.groups().empty());
