@@ -26,7 +26,7 @@ Result<Done> check(const Config& config);
 /// Where far parts of the map go, as the configuration says.
 BlockArchive::Options archive_options(const Config& config);
 
-/// All memory of a run: the engine, the frames, the archive where there is one.
+/// All memory of a run: the engine, the frames, archive and saving of the map where they are asked for.
 MemoryPlan plan_memory(const Config& config, const EngineParams& params);
 
 /// What a source has to be told: the camera and the stamps where the configuration overrides them.
