@@ -57,6 +57,7 @@ struct TrackParams {
   float trust_noise_m = 0.015f;
   float trust_area_m = 2.5f;
   float probation_trust = 0.5f;
+  int32_t sample_cols = 320;
   int32_t first_finest_level = 1;
   int32_t levels = 3;
   int32_t iterations_coarse = 6;
@@ -105,6 +106,9 @@ struct TrackParams {
       "they cover, once the map is mask.reabsorb_s old; 0: off");
     f("probation_trust", &P::probation_trust, 0, 1.0, "1", "ours",
       "in the second registration, of what the map has seen too seldom for its mesh (map.mesh_min_surface)");
+    f("sample_cols", &P::sample_cols, 0, 10000, "pixels", "ours",
+      "every pixel is every 2nd or every 4th one of a row and of a column where a row has more; 0: all of "
+      "them");
     f("first_finest_level", &P::first_finest_level, 0, 2, "level", "ours",
       "where the first registration ends: 0 every pixel, 1 every 2nd; the second one goes to 0");
     f("levels", &P::levels, 1, 3, "levels", "III-B", "coarse-to-fine sub-samplings, finest is every pixel");

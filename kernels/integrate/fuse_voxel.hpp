@@ -80,6 +80,12 @@ struct VoxelGrid {
     const Vec3 row = origin + static_cast<float>(y) * dy + static_cast<float>(z) * dz;
     return {F(row.x) + F(dx.x) * x, F(row.y) + F(dx.y) * x, F(row.z) + F(dx.z) * x};
   }
+  template <class F>
+  STILLMAP_HD Vec3T<F> position(F x, F y, F z) const {
+    return {F(origin.x) + F(dx.x) * x + F(dy.x) * y + F(dz.x) * z,
+            F(origin.y) + F(dx.y) * x + F(dy.y) * y + F(dz.y) * z,
+            F(origin.z) + F(dx.z) * x + F(dy.z) * y + F(dz.z) * z};
+  }
 
  private:
   STILLMAP_HD static Vec3 column(const Se3& T, int32_t c) {

@@ -100,6 +100,10 @@ struct PlainVoxels {
   STILLMAP_HD bool any(bool which) const { return which; }
   STILLMAP_HD uint32_t bits(bool which) const { return which; }
   STILLMAP_HD float ramp(int32_t x) const { return static_cast<float>(x); }
+  /// 0 or 1: where corner i lies along an axis.
+  STILLMAP_HD float corner(int32_t i, int32_t axis) const { return static_cast<float>(i >> axis & 1); }
+  STILLMAP_HD float least(float x) const { return x; }
+  STILLMAP_HD float most(float x) const { return x; }
   STILLMAP_HD int32_t index(int32_t i) const { return i; }
   STILLMAP_HD VoxelState<float> load(const VoxelBlock& block, int32_t i) const {
     const VoxelSurface s = block.surface[i];

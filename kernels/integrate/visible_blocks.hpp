@@ -10,40 +10,78 @@
 namespace stillmap {
 
 enum class BlockView : uint8_t {
-  nothing,  ///< outside the view, or wholly hidden
-  free,     ///< every voxel is seen free
-  mixed     ///< look at the voxels
+  nothing,     ///< outside the view, or wholly hidden
+  free,        ///< every voxel is seen free
+  no_surface,  ///< no voxel is in the truncation band; which are seen free only a look at the voxels tells
+  mixed        ///< look at the voxels
 };
 
-/// A cube of voxels as a sphere in the camera frame against the depth ranges under it. Conservative:
-/// `nothing` and `free` are certain.                                                     test:
-/// visible_blocks_test
-/// @param centre_cam metres; @param radius_m of the sphere around all voxel positions
-STILLMAP_HD BlockView classify(const FrameGeometry& g, const DepthRangePyramid& ranges, Vec3 centre_cam,
-                               float radius_m) {
-  const float z = centre_cam.z;
-  const float far_m = (g.free_max_m > g.max_m ? g.free_max_m : g.max_m) + g.truncation_m;
-  if (z + radius_m < g.min_m || z - radius_m > far_m) return BlockView::nothing;
-  const float near_m = z - radius_m > g.min_m ? z - radius_m : g.min_m;
+/// Where something surely lies in the view: depths along the optical axis, a rectangle of pixels.
+struct ViewBounds {
+  float near_m, far_m;
+  float u0, u1, v0, v1;
+};
+
+/// @param centre_cam metres; @param near_m > 0: nothing nearer is asked for
+STILLMAP_HD ViewBounds bounds_of_sphere(const Intrinsics& k, Vec3 centre_cam, float radius_m, float near_m) {
+  const float far_m = centre_cam.z + radius_m;
+  near_m = centre_cam.z - radius_m > near_m ? centre_cam.z - radius_m : near_m;
   // The widest pixel rectangle that the sphere's box can cover, from its nearest or its farthest depth.
-  const float inv_near = 1.0f / near_m, inv_far = 1.0f / (z + radius_m);
+  const float inv_near = 1.0f / near_m, inv_far = 1.0f / far_m;
   const float x0 = centre_cam.x - radius_m, x1 = centre_cam.x + radius_m;
   const float y0 = centre_cam.y - radius_m, y1 = centre_cam.y + radius_m;
-  const float u0 = g.k.fx * x0 * (x0 < 0.0f ? inv_near : inv_far) + g.k.cx - 1.0f;
-  const float u1 = g.k.fx * x1 * (x1 > 0.0f ? inv_near : inv_far) + g.k.cx + 1.0f;
-  const float v0 = g.k.fy * y0 * (y0 < 0.0f ? inv_near : inv_far) + g.k.cy - 1.0f;
-  const float v1 = g.k.fy * y1 * (y1 > 0.0f ? inv_near : inv_far) + g.k.cy + 1.0f;
+  return {centre_cam.z - radius_m,
+          far_m,
+          k.fx * x0 * (x0 < 0.0f ? inv_near : inv_far) + k.cx,
+          k.fx * x1 * (x1 > 0.0f ? inv_near : inv_far) + k.cx,
+          k.fy * y0 * (y0 < 0.0f ? inv_near : inv_far) + k.cy,
+          k.fy * y1 * (y1 > 0.0f ? inv_near : inv_far) + k.cy};
+}
+
+/// Of all voxels of a block, by its eight corners: tighter than the sphere. The block lies before the camera.
+/// @param Voxels how voxels are taken: the corners are as many as the voxels of a row
+template <class Voxels>
+STILLMAP_HD ViewBounds bounds_of_corners(const Intrinsics& k, const VoxelGrid& grid, const Voxels& voxels) {
+  using F = typename Voxels::Number;
+  ViewBounds b = {1e30f, -1e30f, 1e30f, -1e30f, 1e30f, -1e30f};
+  const auto widen = [&](float& low, float& high, F x) {
+    low = min_of(low, voxels.least(x));
+    high = max_of(high, voxels.most(x));
+  };
+  constexpr float kEnd = static_cast<float>(kBlockEdge - 1);
+  for (int32_t first = 0; first < 8; first += Voxels::kCount) {
+    const auto end = [&](int32_t axis) { return F(kEnd) * voxels.corner(first, axis); };
+    const Vec3T<F> p = grid.position(end(0), end(1), end(2));
+    const F inv_z = F(1.0f) / p.z;
+    widen(b.near_m, b.far_m, p.z);
+    widen(b.u0, b.u1, F(k.fx) * p.x * inv_z + F(k.cx));
+    widen(b.v0, b.v1, F(k.fy) * p.y * inv_z + F(k.cy));
+  }
+  return b;
+}
+
+/// Bounds against the depth ranges under them. All but `mixed` are certain.         test: visible_blocks_test
+/// @param across DepthRangePyramid::query
+STILLMAP_HD BlockView classify(const FrameGeometry& g, const DepthRangePyramid& ranges, const ViewBounds& b,
+                               int32_t across) {
+  constexpr float kRoundingM = 1e-5f;
+  const float most_m = (g.free_max_m > g.max_m ? g.free_max_m : g.max_m) + g.truncation_m;
+  if (b.far_m < g.min_m || b.near_m > most_m) return BlockView::nothing;
+  // A pixel of room on each side: pixels are met by their centres.
+  const float u0 = b.u0 - 1.0f, u1 = b.u1 + 1.0f, v0 = b.v0 - 1.0f, v1 = b.v1 + 1.0f;
   const float last_col = static_cast<float>(ranges.image_cols - 1),
               last_row = static_cast<float>(ranges.image_rows - 1);
   if (!(u1 >= 0.0f && v1 >= 0.0f && u0 <= last_col && v0 <= last_row)) return BlockView::nothing;
   const bool inside = u0 >= 0.0f && v0 >= 0.0f && u1 <= last_col && v1 <= last_row;
-  const DepthRange range = ranges.query(
-      static_cast<int32_t>(v0 > 0.0f ? v0 : 0.0f), static_cast<int32_t>(v1 < last_row ? v1 : last_row),
-      static_cast<int32_t>(u0 > 0.0f ? u0 : 0.0f), static_cast<int32_t>(u1 < last_col ? u1 : last_col));
-  if (range.max_m <= 0.0f || z - radius_m > range.max_m + g.truncation_m) return BlockView::nothing;
-  const bool free = inside && z - radius_m >= g.min_m && z + radius_m <= g.free_max_m && range.min_m > 0.0f &&
-                    z + radius_m < range.min_m - g.truncation_m;
-  return free ? BlockView::free : BlockView::mixed;
+  const DepthRange range = ranges.query(static_cast<int32_t>(v0 > 0.0f ? v0 : 0.0f),
+                                        static_cast<int32_t>(v1 < last_row ? v1 : last_row),
+                                        static_cast<int32_t>(u0 > 0.0f ? u0 : 0.0f),
+                                        static_cast<int32_t>(u1 < last_col ? u1 : last_col), across);
+  if (range.max_m <= 0.0f || b.near_m > range.max_m + g.truncation_m + kRoundingM) return BlockView::nothing;
+  const float far_m = b.far_m + g.truncation_m + kRoundingM;
+  const bool free =
+      inside && b.near_m >= g.min_m && b.far_m <= g.free_max_m && range.min_m > 0.0f && far_m < range.min_m;
+  return free ? BlockView::free : far_m < range.nearest_m ? BlockView::no_surface : BlockView::mixed;
 }
 
 /// A block, or a cube of blocks, in the camera frame.
@@ -104,7 +142,8 @@ struct VisibleGroupPass {
     for (int32_t bit = 0; bit < kGroupBlocks; ++bit) {
       const Int3 block = block_in_group(at, bit);
       const BlockRef ref = has_id(group) ? map.groups[group].block[bit] : group;
-      const BlockView seen = whole == BlockView::free ? whole : look(block, cube);
+      BlockView seen = whole == BlockView::free ? whole : look(block, cube);
+      if (seen == BlockView::mixed || seen == BlockView::no_surface) seen = look_closely(block, seen, voxels);
       if (seen != BlockView::nothing) add(1ull << bit, seen, block, ref, voxels, view);
     }
     return view;
@@ -132,6 +171,10 @@ struct VisibleGroupPass {
       view.mixed |= flag;
       return;
     }
+    if (seen == BlockView::no_surface && is_partly(ref) && !dense && free_space) {
+      view.partly |= flag;
+      return;
+    }
     // Voxels are made only where the frame has something to say about one of them.
     const VoxelsSeen what = look_at_voxels(block, voxels);
     if (what.band || (dense && what.any_free && free_space))
@@ -141,7 +184,15 @@ struct VisibleGroupPass {
   }
   STILLMAP_HD BlockView look(Int3 block, const CubeGeometry& cube) const {
     const Vec3 p_map = voxel_position(first_voxel(block), map.voxel_m) + cube.centre_offset_m;
-    return classify(geometry, ranges, T_cam_map * p_map, cube.radius_m);
+    return classify(geometry, ranges,
+                    bounds_of_sphere(geometry.k, T_cam_map * p_map, cube.radius_m, geometry.min_m), 2);
+  }
+  /// @param at_first what `look` told
+  template <class Voxels>
+  STILLMAP_HD BlockView look_closely(Int3 block, BlockView at_first, const Voxels& voxels) const {
+    constexpr int32_t kTilesAcross = 4;
+    const ViewBounds bounds = bounds_of_corners(geometry.k, VoxelGrid(T_cam_map, block, map.voxel_m), voxels);
+    return bounds.near_m < geometry.min_m ? at_first : classify(geometry, ranges, bounds, kTilesAcross);
   }
   /// A block without voxels of which some is seen free; more than all of it cannot be told of a free one.
   STILLMAP_HD static void add_free(uint64_t flag, bool all_free, bool known_free, GroupView& view) {

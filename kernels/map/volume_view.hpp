@@ -73,35 +73,59 @@ STILLMAP_HD BlockAt lookup(const VolumeView& map, BlockKey key, RecentBlocks<kBi
   return lookup(map, key, recent.place[key * 0x9e3779b97f4a7c15ull >> (64 - kBits)]);
 }
 
-/// Reads a voxel and its seven neighbours towards +x, +y, +z: 000 100 010 110 001 101 011 111.    test:
-/// volume_test
-/// @return false when one of them was never observed; `voxel` is then of no meaning
+/// Of a voxel and its neighbours towards +x, +y, +z: they are in more than one block.
+STILLMAP_HD bool lies_across(Int3 base) {
+  return ((base.x & 7) == 7) | ((base.y & 7) == 7) | ((base.z & 7) == 7);
+}
+
+/// fetch_corners where lies_across.
+template <class Cache>
+STILLMAP_HD bool fetch_corners_across(const VolumeView& map, Int3 base, Cache& cache, VoxelSurface voxel[8]) {
+  const Int3 block = block_of_voxel(base), local = {base.x & 7, base.y & 7, base.z & 7};
+  const int32_t crossed = (local.x == 7 ? 1 : 0) | (local.y == 7 ? 2 : 0) | (local.z == 7 ? 4 : 0);
+  BlockAt found[8];  // by the first corner in it: every part of `crossed`, 0 and all of it included
+  for (int32_t part = 0;; part = (part - crossed) & crossed) {
+    found[part] =
+        lookup(map, pack({block.x + (part & 1), block.y + (part >> 1 & 1), block.z + (part >> 2)}), cache);
+    if (!found[part]) return false;
+    if (part == crossed) break;
+  }
+  const int32_t x[2] = {local.x, (local.x + 1) & 7}, y[2] = {local.y, (local.y + 1) & 7},
+                z[2] = {local.z, (local.z + 1) & 7};
+  for (int32_t i = 0; i < 8; ++i)
+    voxel[i] = found[i & crossed].surface(voxel_index(x[i & 1], y[i >> 1 & 1], z[i >> 2]));
+  return true;
+}
+
+/// Reads a voxel and its seven neighbours towards +x, +y, +z: 000 100 010 110 001 101 011 111. Those that
+/// were never observed are kSdfUnobserved.                                       test: volume_test
+/// @return false when nothing is known of a block of theirs; `voxel` is then of no meaning
 /// @param cache BlockCache or RecentBlocks
 template <class Cache>
-STILLMAP_HD bool read_corners(const VolumeView& map, Int3 base, Cache& cache, VoxelSurface voxel[8]) {
+STILLMAP_HD bool fetch_corners(const VolumeView& map, Int3 base, Cache& cache, VoxelSurface voxel[8]) {
   const Int3 local = {base.x & 7, base.y & 7, base.z & 7};
-  if ((local.x < 7) & (local.y < 7) & (local.z < 7)) {
-    const BlockAt block = lookup(map, pack(block_of_voxel(base)), cache);
-    if (!block) return false;
-    constexpr int32_t y = kBlockEdge, z = kBlockEdge * kBlockEdge;
-    const int32_t at = voxel_index(local.x, local.y, local.z);
-    if (block.seen)
-      for (const int32_t step : {0, 1, y, y + 1, z, z + 1, z + y, z + y + 1})
-        if (!block.seen->has(at + step)) return false;
-    const VoxelSurface* v = block.voxels->surface + at;
-    voxel[0] = v[0], voxel[1] = v[1], voxel[2] = v[y], voxel[3] = v[y + 1];
-    voxel[4] = v[z], voxel[5] = v[z + 1], voxel[6] = v[z + y], voxel[7] = v[z + y + 1];
-  } else {
-    for (int32_t i = 0; i < 8; ++i) {
-      const Int3 corner = {base.x + (i & 1), base.y + (i >> 1 & 1), base.z + (i >> 2)};
-      const BlockAt block = lookup(map, pack(block_of_voxel(corner)), cache);
-      if (!block) return false;
-      voxel[i] = block.surface(index_in_block(corner));
-    }
-  }
+  if (lies_across(base)) return fetch_corners_across(map, base, cache, voxel);
+  const BlockAt block = lookup(map, pack(block_of_voxel(base)), cache);
+  if (!block) return false;
+  constexpr int32_t y = kBlockEdge, z = kBlockEdge * kBlockEdge;
+  const int32_t at = voxel_index(local.x, local.y, local.z);
+  if (block.seen)
+    for (const int32_t step : {0, 1, y, y + 1, z, z + 1, z + y, z + y + 1})
+      if (!block.seen->has(at + step)) return false;
+  const VoxelSurface* v = block.voxels->surface + at;
+  voxel[0] = v[0], voxel[1] = v[1], voxel[2] = v[y], voxel[3] = v[y + 1];
+  voxel[4] = v[z], voxel[5] = v[z + 1], voxel[6] = v[z + y], voxel[7] = v[z + y + 1];
+  return true;
+}
+STILLMAP_HD bool all_observed(const VoxelSurface voxel[8]) {
   bool observed = true;
   for (int32_t i = 0; i < 8; ++i) observed &= voxel[i].sdf != kSdfUnobserved;
   return observed;
+}
+/// @return false also when one of them was never observed
+template <class Cache>
+STILLMAP_HD bool read_corners(const VolumeView& map, Int3 base, Cache& cache, VoxelSurface voxel[8]) {
+  return fetch_corners(map, base, cache, voxel) && all_observed(voxel);
 }
 
 /// Trilinear mean of eight corner values.                                 test: volume_test

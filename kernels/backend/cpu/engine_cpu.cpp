@@ -21,6 +21,7 @@ namespace stillmap {
 namespace {
 
 constexpr int32_t kRowsPerTile = 16;  ///< of the finest level; a multiple of the coarsest step
+constexpr int32_t kLongestStep = 4;   ///< of the finest level; that of the coarsest is four times as long
 constexpr uint32_t kGroupsPerTile = 16;
 constexpr uint32_t kBlocksPerTile = 32;
 /// Frames kept to see what slides; the oldest is mask.reabsorb_s old, or a third more.
@@ -50,10 +51,19 @@ float reach_m(const EngineParams& p) {
   return far_plane_m(p) * std::sqrt(1.0f + x * x + y * y);
 }
 
-/// Neighbouring points err together, the more of them the finer the picture.
+/// Every pixel, or every so manieth of every so manieth row, at the finest level of the registration.
+int32_t finest_step(const EngineParams& p) {
+  int32_t step = 1;
+  while (p.track.sample_cols > 0 && step < kLongestStep && p.camera.k.width > step * p.track.sample_cols)
+    step *= 2;
+  return step;
+}
+
+/// Neighbouring points err together, the more of them the finer the samples.
 float correlated_points(const EngineParams& p) {
   const float pixels = static_cast<float>(p.camera.k.width) * static_cast<float>(p.camera.k.height);
-  return std::max(1.0f, p.track.correlated_points * pixels / (640.0f * 480.0f));
+  const auto step = static_cast<float>(finest_step(p));
+  return std::max(1.0f, p.track.correlated_points * pixels / (640.0f * 480.0f * step * step));
 }
 
 float group_m(const MapParams& map) {
@@ -265,7 +275,7 @@ class CpuEngine final : public Engine {
   void forget_cells();
   void mask_by_residual(const Se3& T_map_cam);
   void mask_by_parts(const Se3& T_map_cam);
-  void write_static_pixels(bool masked);
+  void write_trust(ImageView<const uint8_t> mask, int32_t step);
   template <class F>
   void in_row_tiles(int32_t rows, const F& f) {
     pool_.for_each(tiles_of(rows, kRowsPerTile), [&](uint32_t tile) {
@@ -384,7 +394,7 @@ TrackResult CpuEngine::track(const Se3& T_start, const PosePrior& prior) {
   if (!by_parts()) return register_to_map(T_start, {}, levels, prior);
   if (params_.mask.warp)
     carry_mask(memory_.before.depth_m, memory_.before.dynamic, inverse(T_start) * T_before_, memory_.cells);
-  write_static_pixels(false);
+  write_trust({}, finest_step(params_) << levels.finest);
   return register_to_map(T_start, memory_.trust, levels, prior);
 }
 
@@ -398,20 +408,20 @@ void CpuEngine::make_cells() {
                [&](int32_t first, int32_t last) { loops_.cell_normals(normals, first, last); });
 }
 
-/// Trust of every pixel: from the expected mask before the decision, from the mask after it. In a young map
-/// nothing is better known than what is near: without it the pose slides along the rest.
-void CpuEngine::write_static_pixels(bool masked) {
+/// Trust of every pixel that is tracked: from the expected mask before the decision, from the mask after it.
+/// In a young map nothing is better known than what is near: without it the pose slides along the rest.
+void CpuEngine::write_trust(ImageView<const uint8_t> mask, int32_t step) {
   const bool young = !continued_ && masks_ < static_cast<uint32_t>(reabsorb_frames());
-  StaticPixelPass pass{memory_.cells,
+  const TrustPass pass{memory_.cells,
                        memory_.depth_m,
-                       masked ? memory_.mask : ImageView<uint8_t>{},
+                       mask,
                        memory_.trust,
                        depth_noise(params_.depth, k()),
                        params_.track.trust_noise_m,
                        young ? 0.0f : params_.track.trust_area_m,
                        params_.track.probation_trust,
                        params_.map.mesh_min_surface};
-  in_row_tiles(k().height, [&](int32_t first, int32_t last) { loops_.static_pixels(pass, first, last); });
+  in_row_tiles(k().height, [&](int32_t first, int32_t last) { loops_.trust(pass, first, last, step); });
 }
 
 /// The pose of the camera after an increment about its centre (see TrackPass).
@@ -452,7 +462,9 @@ void CpuEngine::mask_by_parts(const Se3& T_map_cam) {
                     inverse(earlier.T_map_cam) * T_agreed);
   }
   decide_parts(cells, parts, memory_.part_memory, params_.mask, usual_);
-  write_static_pixels(true);
+  const DynamicPixelPass pixels{cells, memory_.depth_m, memory_.mask};
+  in_row_tiles(k().height, [&](int32_t first, int32_t last) { loops_.dynamic_pixels(pixels, first, last); });
+  write_trust(memory_.mask, finest_step(params_));
   remember_cells(T_map_cam);
 }
 
@@ -494,7 +506,8 @@ TrackResult CpuEngine::register_to_map(const Se3& T_start, ImageView<const uint8
   struct Context {
     CpuEngine* engine;
     TrackPass pass;
-  } context{this, track_pass(T_start)};
+    int32_t sample;
+  } context{this, track_pass(T_start), finest_step(params_)};
   context.pass.trust = trust;
   const PassRunner runner{[](void* opaque, const Se3& T_map_cam, int32_t step) {
                             Context& c = *static_cast<Context*>(opaque);
@@ -507,15 +520,16 @@ TrackResult CpuEngine::register_to_map(const Se3& T_start, ImageView<const uint8
                             engine->pool_.for_each(tiles, [&](uint32_t tile) {
                               const int32_t first = static_cast<int32_t>(tile) * kRowsPerTile;
                               engine->memory_.track_tiles[tile] = engine->loops_.track(
-                                  pass, first, std::min(first + kRowsPerTile, rows), step);
+                                  pass, first, std::min(first + kRowsPerTile, rows), c.sample * step);
                             });
                             NormalEq sums;
                             for (uint32_t t = 0; t < tiles; ++t) sums.add(engine->memory_.track_tiles[t]);
                             return sums;
                           },
                           &context};
-  TrackResult result = register_frame(runner, T_start, params_.track, levels,
-                                      scaled_pixels(params_.depth.min_valid_pixels, k()), prior);
+  const int32_t min_points =
+      scaled_pixels(params_.depth.min_valid_pixels, k()) / (context.sample * context.sample);
+  TrackResult result = register_frame(runner, T_start, params_.track, levels, min_points, prior);
   for (float& c : result.covariance) c *= correlated_points(params_);
   return result;
 }

@@ -8,6 +8,10 @@
 
 #include "kernels/base/lane.hpp"
 
+#if defined(__AVX2__)
+#include <immintrin.h>  // for what the compiler does not find by itself: tests of a mask, gathers
+#endif
+
 namespace stillmap {
 
 constexpr int32_t kLanes = 8;
@@ -17,15 +21,24 @@ struct Mask8 {
   Bits bits;  ///< each lane all ones or all zeros
 
   STILLMAP_HD bool any() const {
+#if defined(__AVX2__)
+    const auto all = std::bit_cast<__m256i>(bits);
+    return !_mm256_testz_si256(all, all);
+#else
     int32_t all = 0;
     for (int32_t i = 0; i < kLanes; ++i) all |= bits[i];
     return all != 0;
+#endif
   }
   /// One bit a lane, lane 0 lowest.
   STILLMAP_HD uint32_t lanes() const {
+#if defined(__AVX2__)
+    return static_cast<uint32_t>(_mm256_movemask_ps(std::bit_cast<__m256>(bits)));
+#else
     uint32_t all = 0;
     for (int32_t i = 0; i < kLanes; ++i) all |= (static_cast<uint32_t>(bits[i]) & 1u) << i;
     return all;
+#endif
   }
 };
 STILLMAP_HD Mask8 operator&(Mask8 a, Mask8 b) {
@@ -115,6 +128,16 @@ struct Float8 {
     return x;
   }
   STILLMAP_HD void store(float* to) const { std::memcpy(to, &v, sizeof(v)); }
+  STILLMAP_HD float least() const {
+    float least = v[0];
+    for (int32_t i = 1; i < kLanes; ++i) least = v[i] < least ? v[i] : least;
+    return least;
+  }
+  STILLMAP_HD float most() const {
+    float most = v[0];
+    for (int32_t i = 1; i < kLanes; ++i) most = v[i] > most ? v[i] : most;
+    return most;
+  }
   /// 0, 1, .. 7
   STILLMAP_HD static Float8 ramp() { return Float8(Bits{0, 1, 2, 3, 4, 5, 6, 7}); }
 };
@@ -169,14 +192,21 @@ STILLMAP_HD Int8 to_int(Float8 x) {
 }
 
 /// One element a lane, from anywhere.
-template <class T>
-STILLMAP_HD Float8 gather_float(const T* base, Int8 index) {
+STILLMAP_HD Float8 gather_float(const float* base, Int8 index) {
+#if defined(__AVX2__)
+  return Float8(std::bit_cast<Float8::Bits>(_mm256_i32gather_ps(base, std::bit_cast<__m256i>(index.v), 4)));
+#else
   Float8 out;
-  for (int32_t i = 0; i < kLanes; ++i) out.v[i] = static_cast<float>(base[index[i]]);
+  for (int32_t i = 0; i < kLanes; ++i) out.v[i] = base[index[i]];
   return out;
+#endif
 }
 /// One 32-bit word a lane.
 STILLMAP_HD Int8 gather_word(const void* base, Int8 index) {
+#if defined(__AVX2__)
+  return Int8(std::bit_cast<Int8::Bits>(
+      _mm256_i32gather_epi32(static_cast<const int*>(base), std::bit_cast<__m256i>(index.v), 4)));
+#else
   Int8 out;
   for (int32_t i = 0; i < kLanes; ++i) {
     int32_t word;
@@ -184,6 +214,32 @@ STILLMAP_HD Int8 gather_word(const void* base, Int8 index) {
     out.v[i] = word;
   }
   return out;
+#endif
+}
+
+/// Eight rows of eight 32-bit words: `column[c]` gets word c of every row. By quarters, four words at a time,
+/// which every instruction set has.
+STILLMAP_HD void transposed_words(const void* rows, Int8 column[8]) {
+  using Four = int32_t __attribute__((vector_size(16)));
+  const auto quarter = [&](int32_t row, int32_t col, Four out[4]) {
+    Four in[4];
+    for (int32_t i = 0; i < 4; ++i)
+      std::memcpy(&in[i], static_cast<const char*>(rows) + 32 * (row + i) + 4 * col, sizeof in[i]);
+    const auto low = [](Four a, Four b) { return Four{a[0], b[0], a[1], b[1]}; };
+    const auto high = [](Four a, Four b) { return Four{a[2], b[2], a[3], b[3]}; };
+    const Four ac0 = low(in[0], in[2]), ac1 = high(in[0], in[2]);
+    const Four bd0 = low(in[1], in[3]), bd1 = high(in[1], in[3]);
+    out[0] = low(ac0, bd0), out[1] = high(ac0, bd0), out[2] = low(ac1, bd1), out[3] = high(ac1, bd1);
+  };
+  for (const int32_t col : {0, 4}) {
+    Four upper[4], lower[4];
+    quarter(0, col, upper);
+    quarter(4, col, lower);
+    for (int32_t i = 0; i < 4; ++i) {
+      std::memcpy(&column[col + i].v, &upper[i], sizeof upper[i]);
+      std::memcpy(reinterpret_cast<char*>(&column[col + i].v) + sizeof upper[i], &lower[i], sizeof lower[i]);
+    }
+  }
 }
 
 }  // namespace stillmap

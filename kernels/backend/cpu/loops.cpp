@@ -3,6 +3,7 @@
 
 #include "kernels/backend/cpu/loops.hpp"
 
+#include <algorithm>
 #include <cstring>
 
 #include "kernels/backend/cpu/lanes.hpp"
@@ -20,21 +21,96 @@ int32_t prepare(const PreparePass& pass, int32_t first_row, int32_t last_row) {
 using TrackBlocks = RecentBlocks<6>;
 constexpr int32_t kBatch = 64;  ///< pixels of a row at a time: everything about them stays in the first cache
 
-/// Points that have a value in the map, component by component.
+/// Pixels of a row with the voxels around them; what the arithmetic wants lies component by component.
 struct PointBatch {
-  alignas(32) uint32_t voxel[8][kBatch];
-  alignas(32) float fraction[3][kBatch], arm[3][kBatch], luma[kBatch], trust[kBatch];
-  int32_t size = 0;
+  alignas(32) float arm[3][kBatch], fraction[3][kBatch], luma[kBatch], trust[kBatch];
+  alignas(32) int32_t cell[3][kBatch], in_range[kBatch];
+  alignas(32) VoxelSurface voxel[kBatch][8];
+  alignas(32) float known[kBatch];  ///< 1: measured, trusted, and its blocks are in the map
 
-  TrackPoint<Float8> at(int32_t first) const {
-    TrackPoint<Float8> p;
-    p.surface = Int8(0) == Int8(0);
-    for (int32_t v = 0; v < 8; ++v) {
-      const Int8 word = Int8::load(&voxel[v][first]), sdf = shift_right(word << 16, 16);
-      p.sdf[v] = to_float(sdf);
-      p.luma[v] = to_float(shift_right(word, 16) & Int8(0xffff));
-      p.surface = p.surface & (sdf != Int8(kSdfMax));
+  /// Everything but the map. Pixels beyond `count` are out of range.
+  /// @return how many are measured and trusted
+  int32_t fill(const TrackPass& pass, int32_t row, int32_t first_col, int32_t count, int32_t step) {
+    Int8 considered(0);
+    std::fill_n(known, kBatch, 0.0f);
+    for (int32_t i = 0; i < count; i += kLanes) {
+      Float8 z_m(0.0f), measured(0.0f), trusted(0.0f);
+      for (int32_t l = 0; l < kLanes && i + l < count; ++l) {
+        const int32_t col = first_col + (i + l) * step;
+        z_m.v[l] = pass.depth_m.at(row, col);
+        measured.v[l] = static_cast<float>(pass.colour.at(row, col).luma);
+        trusted.v[l] = pass.trust01(row, col);
+      }
+      const Float8 col = Float8(static_cast<float>(first_col + i * step)) +
+                         Float8(static_cast<float>(step)) * Float8::ramp();
+      const PixelPoint<Float8> p = pass.point_of(Float8(static_cast<float>(row)), col, z_m);
+      p.arm.x.store(&arm[0][i]), p.arm.y.store(&arm[1][i]), p.arm.z.store(&arm[2][i]);
+      p.cell.x.store(&cell[0][i]), p.cell.y.store(&cell[1][i]), p.cell.z.store(&cell[2][i]);
+      p.cell.fraction.x.store(&fraction[0][i]), p.cell.fraction.y.store(&fraction[1][i]);
+      p.cell.fraction.z.store(&fraction[2][i]);
+      measured.store(&luma[i]), trusted.store(&trust[i]);
+      const Int8 use((p.in_range & (trusted > Float8(0.0f))).bits);
+      use.store(&in_range[i]);
+      considered = considered - use;  // all ones is minus one
     }
+    int32_t sum = 0;
+    for (int32_t l = 0; l < kLanes; ++l) sum += considered[l];
+    return sum;
+  }
+
+  /// The voxels around each pixel. First where they lie, so that the memory can be on its way, then those in
+  /// one block, at last those across blocks: each loop does the same for every pixel.
+  void fetch(const TrackPass& pass, int32_t count, TrackBlocks& cache) {
+    const VoxelSurface* from[kBatch];
+    int32_t across[kBatch], crossing = 0;
+    for (int32_t i = 0; i < count; ++i) {
+      known[i] = 0.0f;
+      from[i] = pass.map.free_block->surface;
+      if (!in_range[i]) continue;
+      const Int3 base = {cell[0][i], cell[1][i], cell[2][i]};
+      const BlockAt block = lookup(pass.map, pack(block_of_voxel(base)), cache);
+      if (!block) continue;
+      known[i] = 1.0f;
+      from[i] = block.voxels->surface + index_in_block(base);
+      __builtin_prefetch(from[i]);
+      __builtin_prefetch(from[i] + kBlockEdge * kBlockEdge);
+      across[crossing] = i;
+      crossing += static_cast<int32_t>(lies_across(base)) | static_cast<int32_t>(block.seen != nullptr);
+    }
+    // Those across blocks read something else of their block, here.
+    for (int32_t i = 0; i < count; ++i) {
+      constexpr int32_t y = kBlockEdge, z = kBlockEdge * kBlockEdge;
+      const VoxelSurface* v = from[i];
+      std::memcpy(&voxel[i][0], v, 8);
+      std::memcpy(&voxel[i][2], v + y, 8);
+      std::memcpy(&voxel[i][4], v + z, 8);
+      std::memcpy(&voxel[i][6], v + z + y, 8);
+    }
+    for (int32_t n = 0; n < crossing; ++n) {
+      const int32_t i = across[n];
+      if (fetch_corners(pass.map, {cell[0][i], cell[1][i], cell[2][i]}, cache, voxel[i])) continue;
+      known[i] = 0.0f;
+      std::fill_n(voxel[i], 8, VoxelSurface{0, 0});
+    }
+  }
+  /// @return false: the map knows none of the eight pixels from `first` on
+  bool any_known(int32_t first) const { return (Float8::load(&known[first]) > Float8(0.0f)).any(); }
+
+  /// @param live 1, or 0 where a voxel was never observed
+  TrackPoint<Float8> at(int32_t first, Float8& live) const {
+    TrackPoint<Float8> p;
+    Int8 word[8];
+    transposed_words(&voxel[first], word);
+    Mask8 observed = Int8(0) == Int8(0);
+    p.surface = observed;
+    for (int32_t v = 0; v < 8; ++v) {
+      const Int8 sdf = shift_right(word[v] << 16, 16);
+      p.sdf[v] = to_float(sdf);
+      p.luma[v] = to_float(shift_right(word[v], 16) & Int8(0xffff));
+      p.surface = p.surface & (sdf != Int8(kSdfMax));
+      observed = observed & (sdf != Int8(kSdfUnobserved));
+    }
+    live = select(observed, Float8::load(&known[first]), Float8(0.0f));
     p.fraction = {Float8::load(&fraction[0][first]), Float8::load(&fraction[1][first]),
                   Float8::load(&fraction[2][first])};
     p.arm = {Float8::load(&arm[0][first]), Float8::load(&arm[1][first]), Float8::load(&arm[2][first])};
@@ -43,75 +119,28 @@ struct PointBatch {
   }
 };
 
-/// Pixels of a row, component by component, before the map is looked at.
-struct PixelBatch {
-  alignas(32) float arm[3][kBatch], fraction[3][kBatch];
-  alignas(32) int32_t cell[3][kBatch], in_range[kBatch];
-  int32_t size = 0;
-
-  void fill(const TrackPass& pass, int32_t row, int32_t first_col, int32_t count, int32_t step) {
-    size = count;
-    const float* depth_m = pass.depth_m.row(row);
-    for (int32_t i = 0; i < count; i += kLanes) {
-      Float8 z_m(0.0f);
-      for (int32_t l = 0; l < kLanes && i + l < count; ++l) z_m.v[l] = depth_m[first_col + (i + l) * step];
-      const Float8 col = Float8(static_cast<float>(first_col + i * step)) +
-                         Float8(static_cast<float>(step)) * Float8::ramp();
-      const PixelPoint<Float8> p = pass.point_of(Float8(static_cast<float>(row)), col, z_m);
-      p.arm.x.store(&arm[0][i]), p.arm.y.store(&arm[1][i]), p.arm.z.store(&arm[2][i]);
-      p.cell.x.store(&cell[0][i]), p.cell.y.store(&cell[1][i]), p.cell.z.store(&cell[2][i]);
-      p.cell.fraction.x.store(&fraction[0][i]), p.cell.fraction.y.store(&fraction[1][i]);
-      p.cell.fraction.z.store(&fraction[2][i]);
-      Int8(p.in_range.bits).store(&in_range[i]);
-    }
-  }
-
-  /// Fetches the voxels of pixel `i` and appends it to `out`, unless one of them was never observed.
-  void fetch(const TrackPass& pass, int32_t i, uint16_t measured_luma, float trust, TrackBlocks& cache,
-             PointBatch& out) const {
-    VoxelSurface voxel[8];
-    if (!read_corners(pass.map, {cell[0][i], cell[1][i], cell[2][i]}, cache, voxel)) return;
-    const int32_t n = out.size++;
-    for (int32_t v = 0; v < 8; ++v) std::memcpy(&out.voxel[v][n], &voxel[v], 4);
-    for (int32_t a = 0; a < 3; ++a) {
-      out.fraction[a][n] = fraction[a][i];
-      out.arm[a][n] = arm[a][i];
-    }
-    out.luma[n] = static_cast<float>(measured_luma);
-    out.trust[n] = trust;
-  }
-};
-
 NormalEqT<float> track(const TrackPass& pass, int32_t first_row, int32_t last_row, int32_t step) {
   Float8 sums[kTerms];
   for (Float8& s : sums) s = Float8(0.0f);
-  PixelBatch pixels;
-  PointBatch points = {};  // lanes beyond its size are read, and must be numbers
+  PointBatch points;
   TrackBlocks cache;
-  float considered = 0;
+  int32_t considered = 0;
   for (int32_t r = first_row; r < last_row; r += step)
     for (int32_t c0 = 0; c0 < pass.depth_m.cols; c0 += kBatch * step) {
-      const int32_t left = (pass.depth_m.cols - c0 + step - 1) / step;
-      pixels.fill(pass, r, c0, left < kBatch ? left : kBatch, step);
-      points.size = 0;
-      for (int32_t i = 0; i < pixels.size; ++i) {
-        const int32_t c = c0 + i * step;
-        const float trust = pass.trust01(r, c);
-        if (!pixels.in_range[i] || trust == 0.0f) continue;
-        considered += 1.0f;
-        pixels.fetch(pass, i, pass.colour.at(r, c).luma, trust, cache, points);
-      }
-      for (int32_t i = 0; i < points.size; i += kLanes) {
-        const TrackPoint<Float8> p = points.at(i);
-        const Float8 live =
-            select(Float8::ramp() < Float8(static_cast<float>(points.size - i)), Float8(1.0f), Float8(0.0f));
+      const int32_t left = (pass.depth_m.cols - c0 + step - 1) / step, count = left < kBatch ? left : kBatch;
+      considered += points.fill(pass, r, c0, count, step);
+      points.fetch(pass, count, cache);
+      for (int32_t i = 0; i < count; i += kLanes) {
+        if (!points.any_known(i)) continue;
+        Float8 live;
+        const TrackPoint<Float8> p = points.at(i, live);
         add_point(point_terms(p, pass.weights), p.arm, live, Float8::load(&points.trust[i]), sums);
       }
     }
   NormalEqT<float> total;
   for (int32_t t = 0; t < kTerms; ++t)
     for (int32_t l = 0; l < kLanes; ++l) total.sum[t] += sums[t][l];
-  total.sum[kConsidered] = considered;
+  total.sum[kConsidered] = static_cast<float>(considered);
   return total;
 }
 
@@ -138,9 +167,26 @@ void still_cells(const StillPass& pass, int32_t first_row, int32_t last_row) {
   for (int32_t r = first_row; r < last_row; ++r)
     for (int32_t c = 0; c < pass.cells.depth_m.cols; ++c) pass(r, c);
 }
-void static_pixels(const StaticPixelPass& pass, int32_t first_row, int32_t last_row) {
+
+/// Where all cells around agree, which is most of the picture, no pixel is looked at.
+void dynamic_pixels(const DynamicPixelPass& pass, int32_t first_row, int32_t last_row) {
+  const CellGrid& cells = pass.cells;
   for (int32_t r = first_row; r < last_row; ++r)
-    for (int32_t c = 0; c < pass.depth_m.cols; ++c) pass(r, c);
+    for (int32_t c = 0; c < pass.mask.cols;) {
+      const int32_t cell = cell_col(cells, c);
+      const bool last = cell + 1 == cells.depth_m.cols;
+      const int32_t end = last ? pass.mask.cols : (cell + 1) * cells.px;
+      const int32_t row = cell_row(cells, r);
+      if (pass.all_agree(row, cell))
+        std::fill(pass.mask.row(r) + c, pass.mask.row(r) + end, cells.dynamic.at(row, cell) ? 255 : 0);
+      else
+        for (int32_t i = c; i < end; ++i) pass(r, i);
+      c = end;
+    }
+}
+void trust(const TrustPass& pass, int32_t first_row, int32_t last_row, int32_t step) {
+  for (int32_t r = first_row; r < last_row; r += step)
+    for (int32_t c = 0; c < pass.depth_m.cols; c += step) pass(r, c);
 }
 
 void static_depth(const StaticDepthPass& pass, int32_t tile_row) {
@@ -157,6 +203,11 @@ struct RowVoxels {
   STILLMAP_HD bool any(Mask8 which) const { return which.any(); }
   STILLMAP_HD uint32_t bits(Mask8 which) const { return which.lanes(); }
   STILLMAP_HD Float8 ramp(int32_t) const { return Float8::ramp(); }
+  STILLMAP_HD Float8 corner(int32_t, int32_t axis) const {
+    return to_float(shift_right(to_int(Float8::ramp()), axis) & Int8(1));
+  }
+  STILLMAP_HD float least(Float8 x) const { return x.least(); }
+  STILLMAP_HD float most(Float8 x) const { return x.most(); }
   STILLMAP_HD Int8 index(int32_t i) const { return Int8(i) + to_int(Float8::ramp()); }
   STILLMAP_HD VoxelState<Float8> load(const VoxelBlock& block, int32_t i) const {
     const Int8 s = Int8::load(&block.surface[i]), r = Int8::load(&block.record[i]), byte = Int8(0xff);
@@ -194,8 +245,8 @@ void integrate(const IntegratePass& pass, View<const VisibleBlock> blocks) {
 }  // namespace
 
 extern const CpuLoops STILLMAP_LOOPS;
-const CpuLoops STILLMAP_LOOPS = {STILLMAP_LOOPS_NAME, prepare,      track,         residual_mask,
-                                 cell_depth,          cell_normals, cell_evidence, still_cells,
-                                 static_pixels,       static_depth, visible_group, integrate};
+const CpuLoops STILLMAP_LOOPS = {STILLMAP_LOOPS_NAME, prepare,       track,       residual_mask,  cell_depth,
+                                 cell_normals,        cell_evidence, still_cells, dynamic_pixels, trust,
+                                 static_depth,        visible_group, integrate};
 
 }  // namespace stillmap

@@ -12,6 +12,7 @@
 #include "kernels/integrate/visible_blocks.hpp"
 #include "kernels/mask/cells.hpp"
 #include "kernels/mask/residual_mask.hpp"
+#include "kernels/mask/static_pixels.hpp"
 #include "kernels/prepare/prepare_pixel.hpp"
 #include "kernels/track/track_pass.hpp"
 
@@ -28,7 +29,9 @@ struct CpuLoops {
   void (*cell_normals)(const CellNormalPass&, int32_t first_row, int32_t last_row);
   void (*cell_evidence)(const CellEvidencePass&, int32_t first_row, int32_t last_row);
   void (*still_cells)(const StillPass&, int32_t first_row, int32_t last_row);
-  void (*static_pixels)(const StaticPixelPass&, int32_t first_row, int32_t last_row);
+  void (*dynamic_pixels)(const DynamicPixelPass&, int32_t first_row, int32_t last_row);
+  /// Of every `step`-th pixel of every `step`-th row in [first, last); `first` is a multiple of `step`.
+  void (*trust)(const TrustPass&, int32_t first_row, int32_t last_row, int32_t step);
   void (*static_depth)(const StaticDepthPass&, int32_t tile_row);
   GroupView (*visible_group)(const VisibleGroupPass&, uint32_t group);
   void (*integrate)(const IntegratePass&, View<const VisibleBlock>);

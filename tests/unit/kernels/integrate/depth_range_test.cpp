@@ -27,7 +27,7 @@ DepthRange brute_force(ImageView<const float> depth, int32_t r0, int32_t r1, int
   DepthRange range = {1e30f, 0};
   for (int32_t r = std::max(r0, 0); r <= std::min(r1, depth.rows - 1); ++r)
     for (int32_t c = std::max(c0, 0); c <= std::min(c1, depth.cols - 1); ++c)
-      range = merged(range, {depth.at(r, c), depth.at(r, c)});
+      range = merged(range, range_of(depth.at(r, c)));
   return range;
 }
 
@@ -41,15 +41,17 @@ TEST(DepthRange, QueryHoldsTheRectangleAndLittleMore) {
     for (int n = 0; n < 2000; ++n) {
       const auto [r0, r1] = std::minmax({row(random), row(random)});
       const auto [c0, c1] = std::minmax({col(random), col(random)});
-      const DepthRange got = pyramid.view().query(r0, r1, c0, c1);
+      const DepthRange got = pyramid.view().query(r0, r1, c0, c1, 2 + n % 4);
       const DepthRange exact = brute_force(depth.view(), r0, r1, c0, c1);
       EXPECT_LE(got.min_m, exact.min_m);
       EXPECT_GE(got.max_m, exact.max_m);
+      EXPECT_LE(got.nearest_m, exact.nearest_m);
       // Not more than a tile to each side, and tiles are at most as long as the rectangle, or 8 pixels.
       const int32_t margin = std::max({r1 - r0, c1 - c0, kTilePx});
       const DepthRange around = brute_force(depth.view(), r0 - margin, r1 + margin, c0 - margin, c1 + margin);
       EXPECT_GE(got.min_m, around.min_m);
       EXPECT_LE(got.max_m, around.max_m);
+      EXPECT_GE(got.nearest_m, around.nearest_m);
     }
   }
 }
@@ -66,6 +68,7 @@ TEST(DepthRange, MaskedPixelsAreNoStaticMeasurement) {
   EXPECT_EQ(pyramid.static_depth().at(3, 14), 15.0f);
   EXPECT_EQ(pyramid.view().query(0, 7, 8, 15).min_m, 0.0f);
   EXPECT_EQ(pyramid.view().query(0, 7, 8, 15).max_m, 16.0f);  // of another row
+  EXPECT_EQ(pyramid.view().query(0, 7, 8, 15).nearest_m, 9.0f);
   EXPECT_EQ(pyramid.view().query(8, 15, 8, 15).min_m, 9.0f);
 }
 

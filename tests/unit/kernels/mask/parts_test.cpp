@@ -1,3 +1,5 @@
+#include "kernels/backend/cpu/loops.hpp"
+#include "kernels/mask/static_pixels.hpp"
 #include "tests/unit/kernels/mask/parts_fixture.hpp"
 
 namespace stillmap {
@@ -199,15 +201,23 @@ TEST_F(PartsTest, APixelBelongsToTheCellOfItsSurface) {
   depth_m[30 * kCols + 31] = kWallM;                    // within it, of the wall
   depth_m[30 * kCols + 28] = 0.5f * (kNearM + kWallM);  // flying, not next to it
   depth_m[31 * kCols + 29] = 0.5f * (kNearM + kWallM);  // flying beside it
-  StaticPixelPass pass{cells,
-                       {depth_m.data(), kRows, kCols, kCols},
-                       {mask.data(), kRows, kCols, kCols},
-                       {trust.data(), kRows, kCols, kCols},
-                       noise,
-                       0.01f,
-                       0.0f};
+  const DynamicPixelPass pixel{
+      cells, {depth_m.data(), kRows, kCols, kCols}, {mask.data(), kRows, kCols, kCols}};
+  TrustPass pass{cells,
+                 {depth_m.data(), kRows, kCols, kCols},
+                 {mask.data(), kRows, kCols, kCols},
+                 {trust.data(), kRows, kCols, kCols},
+                 noise,
+                 0.01f,
+                 0.0f};
+  std::vector<uint8_t> all_at_once(kRows * kCols);
+  best_loops().dynamic_pixels({cells, pixel.depth_m, {all_at_once.data(), kRows, kCols, kCols}}, 0, kRows);
   for (int32_t r = 0; r < kRows; ++r)
-    for (int32_t c = 0; c < kCols; ++c) pass(r, c);
+    for (int32_t c = 0; c < kCols; ++c) {
+      pixel(r, c);
+      pass(r, c);
+    }
+  EXPECT_EQ(all_at_once, mask);
   EXPECT_EQ(mask[30 * kCols + 29], 255);
   EXPECT_EQ(mask[30 * kCols + 28], 0);
   EXPECT_EQ(mask[31 * kCols + 29], 255);
@@ -231,7 +241,7 @@ TEST_F(PartsTest, NoiseAcrossTheRayCountsAtGrazingAnglesAndEdges) {
   noise = {0.0f, 0.002f, 0.002f};  // 18 mm along the ray, 6 mm across
   std::vector<float> depth_m(kRows * kCols, kWallM);
   std::vector<uint8_t> trust(kRows * kCols);
-  const StaticPixelPass pass{
+  const TrustPass pass{
       cells, {depth_m.data(), kRows, kCols, kCols}, {}, {trust.data(), kRows, kCols, kCols}, noise, 0.01f};
   const auto trusted = [&](Vec3 leaning) {
     cells.normal.at(30, 40) = leaning;
