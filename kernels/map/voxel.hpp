@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "kernels/base/hd.hpp"
+#include "kernels/base/lane.hpp"
 #include "kernels/base/view.hpp"
 
 namespace stillmap {
@@ -43,8 +44,9 @@ STILLMAP_HD int32_t voxel_index(int32_t x, int32_t y, int32_t z) {
 }
 
 /// Luminance of the paper (section III-B), 0..1.
-STILLMAP_HD float luminance(float r, float g, float b) {
-  return (0.2126f * r + 0.7152f * g + 0.0722f * b) * (1.0f / 255.0f);
+template <class F>
+STILLMAP_HD F luminance(F r, F g, F b) {
+  return (F(0.2126f) * r + F(0.7152f) * g + F(0.0722f) * b) * F(1.0f / 255.0f);
 }
 STILLMAP_HD float luminance(Rgb8 c) {
   return luminance(static_cast<float>(c.r), static_cast<float>(c.g), static_cast<float>(c.b));
@@ -61,11 +63,19 @@ STILLMAP_HD uint8_t clamp_to_byte(float x) {
   return static_cast<uint8_t>(x < 0.0f ? 0.0f : x > 255.0f ? 255.0f : x + 0.5f);
 }
 
+/// From red, green and blue, 0..255. @return the words of a LumaChroma: luma, cb << 16, cr << 24
+template <class F>
+STILLMAP_HD IntOf<F> luma_chroma_word(F r, F g, F b) {
+  const F half = F(0.5f), y = luminance(r, g, b);
+  const auto byte = [&](F x) { return to_int(min_of(max_of(x, F(0.0f)), F(255.0f)) + half); };
+  const auto chroma = [&](F x, float scale) { return byte(F(128.0f) + (x - F(255.0f) * y) * F(scale)); };
+  return to_int(y * F(kLumaScale) + half) | (chroma(b, 1.0f / 1.8556f) << 16) |
+         (chroma(r, 1.0f / 1.5748f) << 24);
+}
 STILLMAP_HD LumaChroma luma_chroma(Rgb8 c) {
-  const float y = luminance(c);
-  return {static_cast<uint16_t>(y * kLumaScale + 0.5f),
-          clamp_to_byte(128.0f + (static_cast<float>(c.b) - 255.0f * y) * (1.0f / 1.8556f)),
-          clamp_to_byte(128.0f + (static_cast<float>(c.r) - 255.0f * y) * (1.0f / 1.5748f))};
+  const auto word = static_cast<uint32_t>(
+      luma_chroma_word(static_cast<float>(c.r), static_cast<float>(c.g), static_cast<float>(c.b)));
+  return {static_cast<uint16_t>(word), static_cast<uint8_t>(word >> 16), static_cast<uint8_t>(word >> 24)};
 }
 
 /// Colour of a voxel from luminance (0..1) and chroma (bytes about 128).

@@ -106,7 +106,7 @@ struct CellGrid {
 /// one cell to the next, and never less than what the sensor smears at an edge.
 STILLMAP_HD float depth_edge_m(float z_m) {
   constexpr float kShare = 0.025f, kLeastM = 0.03f;
-  return fmaxf(kShare * z_m, kLeastM);
+  return max_of(kShare * z_m, kLeastM);
 }
 
 /// Depth of one cell: the mean of the pixels that lie on the surface in its middle.
@@ -199,9 +199,9 @@ struct CellEvidencePass {
       residual.terms = point_terms(point, track.weights);
       residual.arm = point.arm;
       const float limit_m =
-          fminf(contradict_m + contradict_sigmas * noise.at(z_m), 0.9f * track.map.truncation_m);
+          min_of(contradict_m + contradict_sigmas * noise.at(z_m), 0.9f * track.map.truncation_m);
       const float off = fabsf(residual.terms.depth_residual_m) / limit_m;
-      contradiction = fminf(fmaxf(2.0f * (off - 0.5f), 0.0f), 1.0f);
+      contradiction = min_of(max_of(2.0f * (off - 0.5f), 0.0f), 1.0f);
       if (contradiction > 0.0f && behind_another(row, col, residual.terms)) contradiction = kUnknown;
       const Int3 voxel =
           nearest_voxel(track.point_of(static_cast<float>(row), static_cast<float>(col), z_m).cell);

@@ -16,9 +16,8 @@ constexpr uint16_t kRawFar = 65535;  ///< like 0: no measurement
 /// Metres, 0 when there is no usable measurement. Farther than depth.max_m stays: such a ray still sees free
 /// space.
 STILLMAP_HD float metres_from_raw(uint16_t raw, float m_per_unit, float min_m) {
-  if (raw == 0 || raw == kRawFar) return 0.0f;
   const float z_m = static_cast<float>(raw) * m_per_unit;
-  return z_m < min_m ? 0.0f : z_m;
+  return (raw == 0) | (raw == kRawFar) | (z_m < min_m) ? 0.0f : z_m;
 }
 
 /// Bilinear colour at (u, v); black outside.                            test: prepare_test

@@ -136,7 +136,7 @@ STILLMAP_HD float exit_m(Vec3 h, Vec3 d, Int3 block) {
     const float to = static_cast<float>((rate > 0.0f ? low + 1 : low) * kBlockEdge);
     return (to - at) / rate;
   };
-  return fminf(along(h.x, d.x, block.x), fminf(along(h.y, d.y, block.y), along(h.z, d.z, block.z)));
+  return min_of(along(h.x, d.x, block.x), min_of(along(h.y, d.y, block.y), along(h.z, d.z, block.z)));
 }
 
 /// A stretch of a ray that begins outside and ends inside; distances in voxels.
@@ -204,7 +204,7 @@ STILLMAP_HD RayHit cast_ray(const VolumeView& map, const Ray& ray, Blocks& block
       t_outside = t;
       s_outside = static_cast<float>(kSdfMax) * voxels_per_unit;
       if (block && side < 0 && !ray.through_backs) return {};
-      t += fmaxf(exit_m(h, d, block_of_voxel(voxel)), 0.0f) + 0.01f * m_per_voxel;
+      t += max_of(exit_m(h, d, block_of_voxel(voxel)), 0.0f) + 0.01f * m_per_voxel;
       side = block ? 1 : 0;
       continue;
     }
@@ -224,7 +224,7 @@ STILLMAP_HD RayHit cast_ray(const VolumeView& map, const Ray& ray, Blocks& block
     side = s < 0.0f ? -1 : 1;
     t_outside = t;
     s_outside = s;
-    t += fmaxf(1.0f, kStepShare * fabsf(s)) * m_per_voxel;
+    t += max_of(1.0f, kStepShare * fabsf(s)) * m_per_voxel;
   }
   return {};
 }

@@ -108,7 +108,7 @@ struct RayRangesPass {
     const float half = half_edge_m();
     const float deep = reach({0, 0, 1});
     const float nearest = centre_cam.z - deep, farthest = centre_cam.z + deep;
-    if (nearest < fmaxf(near_m, 0.01f)) {  // around the camera: its outline has no use
+    if (nearest < max_of(near_m, 0.01f)) {  // around the camera: its outline has no use
       for (int32_t row = 0; row < ranges.tiles.rows; ++row)
         for (int32_t col = 0; col < ranges.tiles.cols; ++col)
           widen(ranges.tiles.at(row, col), near_m, farthest);
@@ -118,8 +118,8 @@ struct RayRangesPass {
     for (int32_t i = 0; i < 8; ++i) {
       const Vec3 corner = {i & 1 ? half : -half, i & 2 ? half : -half, i & 4 ? half : -half};
       const Pixel p = project(k, centre_cam + T_cam_map.rotation * corner);
-      left = fminf(left, p.u), right = fmaxf(right, p.u);
-      top = fminf(top, p.v), bottom = fmaxf(bottom, p.v);
+      left = min_of(left, p.u), right = max_of(right, p.u);
+      top = min_of(top, p.v), bottom = max_of(bottom, p.v);
     }
     const int32_t row0 = tile_of(top, ranges.tiles.rows), row1 = tile_of(bottom, ranges.tiles.rows);
     const int32_t col0 = tile_of(left, ranges.tiles.cols), col1 = tile_of(right, ranges.tiles.cols);
@@ -130,7 +130,7 @@ struct RayRangesPass {
   /// Kept within the image: a tile too many does no harm.
   STILLMAP_HD int32_t tile_of(float pixel, int32_t tiles) const {
     const float tile = floorf(pixel / static_cast<float>(ranges.tile_px));
-    return static_cast<int32_t>(fminf(fmaxf(tile, 0.0f), static_cast<float>(tiles - 1)));
+    return static_cast<int32_t>(min_of(max_of(tile, 0.0f), static_cast<float>(tiles - 1)));
   }
 
   STILLMAP_HD static void widen(RayRange& range, float nearest, float farthest) {

@@ -34,8 +34,8 @@ struct RaycastPass {
   /// A range holds the cells of its surfaces whole: where it begins the ray is outside of them. A voxel more
   /// covers rounding.
   STILLMAP_HD void narrow(Ray& ray, RayRange range) const {
-    ray.near_m = fmaxf(ray.near_m, float_of(range.nearest_bits) - map.voxel_m);
-    ray.far_m = fminf(ray.far_m, float_of(range.farthest_bits) + map.voxel_m);
+    ray.near_m = max_of(ray.near_m, float_of(range.nearest_bits) - map.voxel_m);
+    ray.far_m = min_of(ray.far_m, float_of(range.farthest_bits) + map.voxel_m);
   }
 };
 

@@ -48,8 +48,8 @@ struct ShrinkPass {
         if (!(z_m > 0.0f && z_m <= max_m)) continue;
         ++measured;
         sum_m += z_m;
-        nearest_m = fminf(nearest_m, z_m);
-        farthest_m = fmaxf(farthest_m, z_m);
+        nearest_m = min_of(nearest_m, z_m);
+        farthest_m = max_of(farthest_m, z_m);
       }
     const float least = kCellFilled * static_cast<float>(px * px);
     const float mean_m = measured > 0 ? sum_m / static_cast<float>(measured) : 0.0f;
@@ -73,8 +73,8 @@ struct HalvePass {
       if (z_m > 0.0f) {
         ++measured;
         sum_m += z_m;
-        nearest_m = fminf(nearest_m, z_m);
-        farthest_m = fmaxf(farthest_m, z_m);
+        nearest_m = min_of(nearest_m, z_m);
+        farthest_m = max_of(farthest_m, z_m);
       }
       if (l == kNoLuma) continue;
       ++unmasked;

@@ -63,8 +63,8 @@ struct ViewCheckPass {
         const float e_m = expected_m.at(r, c);
         hole |= e_m <= 0.0f;
         if (e_m <= 0.0f) continue;
-        nearest_m = fminf(nearest_m, e_m);
-        farthest_m = fmaxf(farthest_m, e_m);
+        nearest_m = min_of(nearest_m, e_m);
+        farthest_m = max_of(farthest_m, e_m);
       }
     if (farthest_m > 0.0f && !hole && z_m > farthest_m + 2.0f * tolerance) return CellVerdict::through;
     if (farthest_m > 0.0f && z_m < nearest_m - 2.0f * tolerance) return CellVerdict::front;

@@ -11,10 +11,40 @@
 namespace stillmap {
 namespace {
 
+/// A row of a picture without distortion: every pixel stays where it is.
+int32_t prepare_row(const PreparePass& pass, int32_t row) {
+  const int32_t cols = pass.depth_m.cols, whole = cols / kLanes * kLanes;
+  const uint16_t* raw = pass.depth_raw.row(row);
+  const Rgb8* rgb = pass.colour_raw.row(row);
+  float* depth_m = pass.depth_m.row(row);
+  LumaChroma* luma_chroma = pass.luma_chroma_image.row(row);
+  int32_t valid = 0;
+  for (int32_t c = 0; c < cols; ++c) {
+    const float z_m = metres_from_raw(raw[c], pass.m_per_unit, pass.min_m);
+    depth_m[c] = z_m;
+    valid += static_cast<int32_t>(z_m > 0.0f) & static_cast<int32_t>(z_m <= pass.max_m);
+  }
+  std::copy_n(rgb, cols, pass.colour.row(row));
+  for (int32_t c = 0; c < whole; c += kLanes) {
+    Int8 r, g, b;
+    for (int32_t l = 0; l < kLanes; ++l) {
+      r.v[l] = rgb[c + l].r;
+      g.v[l] = rgb[c + l].g;
+      b.v[l] = rgb[c + l].b;
+    }
+    luma_chroma_word(to_float(r), to_float(g), to_float(b)).store(luma_chroma + c);
+  }
+  for (int32_t c = whole; c < cols; ++c) luma_chroma[c] = stillmap::luma_chroma(rgb[c]);
+  return valid;
+}
+
 int32_t prepare(const PreparePass& pass, int32_t first_row, int32_t last_row) {
   int32_t valid = 0;
   for (int32_t r = first_row; r < last_row; ++r)
-    for (int32_t c = 0; c < pass.depth_m.cols; ++c) valid += pass(r, c);
+    if (!pass.source_pixel.data)
+      valid += prepare_row(pass, r);
+    else
+      for (int32_t c = 0; c < pass.depth_m.cols; ++c) valid += pass(r, c);
   return valid;
 }
 
