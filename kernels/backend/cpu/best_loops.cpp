@@ -5,13 +5,34 @@
 
 namespace stillmap {
 
+namespace {
+
+/// Those that this machine can run, the best one first.
+View<const CpuLoops* const> runnable() {
+  static const CpuLoops* tables[3];
+  static const uint32_t count = [] {
+    uint32_t n = 0;
+#if defined(__x86_64__)
+    const bool avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+    if (avx2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+        __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&
+        __builtin_cpu_supports("avx512cd"))
+      tables[n++] = &kLoopsAvx512;
+    if (avx2) tables[n++] = &kLoopsAvx2;
+#endif
+    tables[n++] = &kLoopsBaseline;
+    return n;
+  }();
+  return {tables, count};
+}
+
+}  // namespace
+
 const CpuLoops& best_loops() {
   const char* asked = std::getenv("STILLMAP_ISA");
-  if (asked && std::strcmp(asked, kLoopsBaseline.name) == 0) return kLoopsBaseline;
-#if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return kLoopsAvx2;
-#endif
-  return kLoopsBaseline;
+  for (const CpuLoops* table : runnable())
+    if (asked && std::strcmp(asked, table->name) == 0) return *table;
+  return *runnable()[0];
 }
 
 }  // namespace stillmap

@@ -40,9 +40,10 @@ struct CpuLoops {
 extern const CpuLoops kLoopsBaseline;
 #if defined(__x86_64__)
 extern const CpuLoops kLoopsAvx2;
+extern const CpuLoops kLoopsAvx512;  ///< eight lanes as well, with masks
 #endif
 
-/// Best table for this machine; STILLMAP_ISA=baseline in the environment asks for the plain one.  @thread
+/// Best table for this machine; STILLMAP_ISA in the environment names another one.  @thread
 /// boot
 const CpuLoops& best_loops();
 
