@@ -10,10 +10,11 @@
 namespace stillmap {
 
 enum class BlockView : uint8_t {
-  nothing,     ///< outside the view, or wholly hidden
-  free,        ///< every voxel is seen free
-  no_surface,  ///< no voxel is in the truncation band; which are seen free only a look at the voxels tells
-  mixed        ///< look at the voxels
+  nothing,           ///< outside the view, or wholly hidden
+  free,              ///< every voxel is seen free
+  free_if_measured,  ///< every voxel is seen free but for those on whose ray nothing was measured
+  no_surface,        ///< no voxel is in the band; which are seen free only a look at the voxels tells
+  mixed              ///< look at the voxels
 };
 
 /// Where something surely lies in the view: depths along the optical axis, a rectangle of pixels.
@@ -79,9 +80,9 @@ STILLMAP_HD BlockView classify(const FrameGeometry& g, const DepthRangePyramid& 
                                         static_cast<int32_t>(u1 < last_col ? u1 : last_col), across);
   if (range.max_m <= 0.0f || b.near_m > range.max_m + g.truncation_m + kRoundingM) return BlockView::nothing;
   const float far_m = b.far_m + g.truncation_m + kRoundingM;
-  const bool free =
-      inside && b.near_m >= g.min_m && b.far_m <= g.free_max_m && range.min_m > 0.0f && far_m < range.min_m;
-  return free ? BlockView::free : far_m < range.nearest_m ? BlockView::no_surface : BlockView::mixed;
+  if (far_m >= range.nearest_m) return BlockView::mixed;
+  if (!inside || b.near_m < g.min_m || b.far_m > g.free_max_m) return BlockView::no_surface;
+  return range.min_m > 0.0f ? BlockView::free : BlockView::free_if_measured;
 }
 
 /// A block, or a cube of blocks, in the camera frame.
@@ -138,12 +139,12 @@ struct VisibleGroupPass {
     const BlockView whole = look(block_in_group(at, 0), group_cube());
     if (whole == BlockView::nothing) return view;
     const CubeGeometry cube = cube_geometry(kBlockEdge, map.voxel_m);
-    if (whole == BlockView::free && settled(group)) return view;
+    if ((whole == BlockView::free || whole == BlockView::free_if_measured) && settled(group)) return view;
     for (int32_t bit = 0; bit < kGroupBlocks; ++bit) {
       const Int3 block = block_in_group(at, bit);
       const BlockRef ref = has_id(group) ? map.groups[group].block[bit] : group;
       BlockView seen = whole == BlockView::free ? whole : look(block, cube);
-      if (seen == BlockView::mixed || seen == BlockView::no_surface) seen = look_closely(block, seen, voxels);
+      if (seen > BlockView::free) seen = look_closely(block, seen, voxels);
       if (seen != BlockView::nothing) add(1ull << bit, seen, block, ref, voxels, view);
     }
     return view;
@@ -171,8 +172,13 @@ struct VisibleGroupPass {
       view.mixed |= flag;
       return;
     }
-    if (seen == BlockView::no_surface && is_partly(ref) && !dense && free_space) {
-      view.partly |= flag;
+    if (seen != BlockView::mixed && !dense && is_free(ref)) {
+      // What is known to be free and is not contradicted was looked at once more, holes or not.
+      if (seen == BlockView::free_if_measured && free_space && !settled(ref)) view.free |= flag;
+      return;
+    }
+    if (seen != BlockView::mixed && !dense && is_partly(ref)) {
+      if (free_space) view.partly |= flag;
       return;
     }
     // Voxels are made only where the frame has something to say about one of them.
