@@ -9,7 +9,7 @@ packages=(
   build-essential ca-certificates cmake git ninja-build pkg-config python3
   libeigen3-dev libfmt-dev libcli11-dev nlohmann-json3-dev libtomlplusplus-dev libnanoflann-dev
   libspng-dev libturbojpeg0-dev libzstd-dev libcairo2-dev fonts-dejavu-core
-  libgtest-dev libbenchmark-dev
+  libgtest-dev libbenchmark-dev valgrind
 )
 if [[ "${1:-}" == --lint ]]; then
   packages+=(clang-14 clang-format-14 clang-tidy-14)

@@ -41,6 +41,7 @@ EngineParams paper_params() {
   p.track.kernel = RobustKernel::huber;
   p.track.trust_noise_m = p.track.trust_area_m = 0;
   p.track.first_finest_level = 0;
+  p.map.free_space = FreeSpace::dense;
   return p;
 }
 
