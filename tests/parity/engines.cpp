@@ -19,8 +19,9 @@ std::vector<NamedEngine> available_engines() {
       cpu("cpu-baseline", kSameBits, kLoopsBaseline, 1),
       cpu("cpu-baseline-3-threads", kSameBits, kLoopsBaseline, 3),
   };
-  const CpuLoops& best = best_loops();
-  if (&best != &kLoopsBaseline) engines.push_back(cpu(std::string("cpu-") + best.name, kRounding, best, 2));
+  for (const CpuLoops* loops : runnable_loops())
+    if (loops != &kLoopsBaseline)
+      engines.push_back(cpu(std::string("cpu-") + loops->name, kRounding, *loops, 2));
   return engines;
 }
 

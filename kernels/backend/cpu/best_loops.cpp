@@ -5,10 +5,7 @@
 
 namespace stillmap {
 
-namespace {
-
-/// Those that this machine can run, the best one first.
-View<const CpuLoops* const> runnable() {
+View<const CpuLoops* const> runnable_loops() {
   static const CpuLoops* tables[3];
   static const uint32_t count = [] {
     uint32_t n = 0;
@@ -26,13 +23,11 @@ View<const CpuLoops* const> runnable() {
   return {tables, count};
 }
 
-}  // namespace
-
 const CpuLoops& best_loops() {
   const char* asked = std::getenv("STILLMAP_ISA");
-  for (const CpuLoops* table : runnable())
+  for (const CpuLoops* table : runnable_loops())
     if (asked && std::strcmp(asked, table->name) == 0) return *table;
-  return *runnable()[0];
+  return *runnable_loops()[0];
 }
 
 }  // namespace stillmap

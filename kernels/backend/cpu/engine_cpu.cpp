@@ -51,7 +51,7 @@ float reach_m(const EngineParams& p) {
   return far_plane_m(p) * std::sqrt(1.0f + x * x + y * y);
 }
 
-/// Every pixel, or every so manieth of every so manieth row, at the finest level of the registration.
+/// At the finest level of the registration: 1: every pixel; n: every n-th one of every n-th row.
 int32_t finest_step(const EngineParams& p) {
   int32_t step = 1;
   while (p.track.sample_cols > 0 && step < kLongestStep && p.camera.k.width > step * p.track.sample_cols)

@@ -43,6 +43,9 @@ extern const CpuLoops kLoopsAvx2;
 extern const CpuLoops kLoopsAvx512;  ///< eight lanes as well, with masks
 #endif
 
+/// Tables that this machine can run, the best one first; the last one is kLoopsBaseline.  @thread boot
+View<const CpuLoops* const> runnable_loops();
+
 /// Best table for this machine; STILLMAP_ISA in the environment names another one.  @thread
 /// boot
 const CpuLoops& best_loops();

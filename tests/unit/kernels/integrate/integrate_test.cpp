@@ -482,7 +482,7 @@ TEST(IntegratePass, PlainVoxelsEqualRowsOfEight) {
       colour.view().at(r, c) = {static_cast<uint16_t>(luma(random)), static_cast<uint8_t>(byte(random)),
                                 static_cast<uint8_t>(byte(random))};
     }
-  for (const CpuLoops* loops : {&kLoopsBaseline, &best_loops()})
+  for (const CpuLoops* loops : runnable_loops())
     for (const bool free_space : {true, false}) {
       AnalyticMap plain(400, kVoxelM, kTruncationM), rows(400, kVoxelM, kTruncationM);
       fill_at_random(plain, 5);

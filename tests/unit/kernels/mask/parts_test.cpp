@@ -211,13 +211,15 @@ TEST_F(PartsTest, APixelBelongsToTheCellOfItsSurface) {
                  0.01f,
                  0.0f};
   std::vector<uint8_t> all_at_once(kRows * kCols);
-  best_loops().dynamic_pixels({cells, pixel.depth_m, {all_at_once.data(), kRows, kCols, kCols}}, 0, kRows);
   for (int32_t r = 0; r < kRows; ++r)
     for (int32_t c = 0; c < kCols; ++c) {
       pixel(r, c);
       pass(r, c);
     }
-  EXPECT_EQ(all_at_once, mask);
+  for (const CpuLoops* loops : runnable_loops()) {
+    loops->dynamic_pixels({cells, pixel.depth_m, {all_at_once.data(), kRows, kCols, kCols}}, 0, kRows);
+    EXPECT_EQ(all_at_once, mask) << loops->name;
+  }
   EXPECT_EQ(mask[30 * kCols + 29], 255);
   EXPECT_EQ(mask[30 * kCols + 28], 0);
   EXPECT_EQ(mask[31 * kCols + 29], 255);

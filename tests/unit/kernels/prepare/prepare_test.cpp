@@ -81,26 +81,30 @@ struct Prepared {
 };
 
 TEST(Prepare, WritesMetresLumaAndCountsWhatIsInRange) {
-  Prepared images(2, 4);
+  constexpr int32_t kCols = 20;  // twice eight at a time, and a rest
+  Prepared images(2, kCols);
   const uint16_t raw[2][4] = {{0, 65535, 50, 100}, {1234, 5000, 5001, 60000}};
   const float metres[2][4] = {{0, 0, 0, 0.1f}, {1.234f, 5.0f, 5.001f, 60.0f}};
   for (int32_t r = 0; r < 2; ++r)
-    for (int32_t c = 0; c < 4; ++c) {
-      images.depth_raw.view().at(r, c) = raw[r][c];
+    for (int32_t c = 0; c < kCols; ++c) {
+      images.depth_raw.view().at(r, c) = raw[r][c % 4];
       images.colour_raw.view().at(r, c) = {static_cast<uint8_t>(60 * c), static_cast<uint8_t>(100 * r), 7};
     }
-  for (const CpuLoops* loops : {&kLoopsBaseline, &best_loops()}) {
-    EXPECT_EQ(loops->prepare(images.pass(false), 0, 2), 3);
+  for (const CpuLoops* loops : runnable_loops()) {
+    EXPECT_EQ(loops->prepare(images.pass(false), 0, 2), 15);
     for (int32_t r = 0; r < 2; ++r)
-      for (int32_t c = 0; c < 4; ++c) {
-        EXPECT_FLOAT_EQ(images.depth_m.view().at(r, c), metres[r][c]);
+      for (int32_t c = 0; c < kCols; ++c) {
+        EXPECT_FLOAT_EQ(images.depth_m.view().at(r, c), metres[r][c % 4]);
         const Rgb8 in = images.colour_raw.view().at(r, c), out = images.colour.view().at(r, c);
         EXPECT_EQ(in.r, out.r);
         EXPECT_EQ(in.g, out.g);
-        EXPECT_EQ(images.luma.view().at(r, c).luma, luma_chroma(in).luma);
+        const LumaChroma plain = luma_chroma(in), got = images.luma.view().at(r, c);
+        EXPECT_EQ(got.luma, plain.luma) << loops->name;
+        EXPECT_EQ(got.cb, plain.cb);
+        EXPECT_EQ(got.cr, plain.cr);
       }
   }
-  EXPECT_EQ(kLoopsBaseline.prepare(images.pass(false), 1, 2), 2);  // rows [first, last)
+  EXPECT_EQ(kLoopsBaseline.prepare(images.pass(false), 1, 2), 10);  // rows [first, last)
 }
 
 // A checker of two depths seen through a strong lens: whatever comes out is one of the two, and the nearest.
@@ -113,7 +117,7 @@ TEST(Prepare, UndistortedDepthIsTheNearestNeverABlend) {
       images.depth_raw.view().at(r, c) = (r / 3 + c / 3) % 2 ? 1000 : 3000;
       images.source.view().at(r, c) = distort(camera, {static_cast<float>(c), static_cast<float>(r)});
     }
-  for (const CpuLoops* loops : {&kLoopsBaseline, &best_loops()}) {
+  for (const CpuLoops* loops : runnable_loops()) {
     const int32_t in_range = loops->prepare(images.pass(true), 0, kRows);
     int32_t seen = 0, moved = 0;
     for (int32_t r = 0; r < kRows; ++r)

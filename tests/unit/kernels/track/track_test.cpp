@@ -202,7 +202,7 @@ TEST_F(TrackTest, PlainPassEqualsTheVectorLoops) {
   pass.weights.kernel_per_range2 = 0.003f;
   for (const bool use_trust : {false, true})
     for (const int32_t step : {1, 2, 4})
-      for (const CpuLoops* loops : {&kLoopsBaseline, &best_loops()}) {
+      for (const CpuLoops* loops : runnable_loops()) {
         pass.trust = use_trust ? view.image(trust) : ImageView<const uint8_t>{};
         pass.weights.kernel = use_trust ? RobustKernel::geman_mcclure : RobustKernel::huber;
         NormalEqT<float> plain;

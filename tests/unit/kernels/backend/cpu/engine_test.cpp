@@ -189,6 +189,36 @@ TEST(CpuEngine, MapsTheSceneWithinAVoxelAndTracksInIt) {
   EXPECT_EQ(rig.engine->mask(track.T_world_cam).masked_pixels, 0);
 }
 
+TEST(CpuEngine, OfAWidePictureOnlyTheSampledPixelsAreTracked) {
+  const Intrinsics k = corner_camera(kWidth);
+  const CornerView view({}, k, {});
+  CornerView spoiled = view;
+  for (int32_t r = 0; r < k.height; ++r)
+    for (int32_t c = 0; c < k.width; ++c)
+      if (r % 2 == 1 || c % 2 == 1) spoiled.depth_raw[static_cast<size_t>(r * k.width + c)] += 100;  // 2 cm
+  Se3 T_start;
+  T_start.translation = {0.01f, 0.0f, -0.01f};
+  const auto spoils = [&](int32_t sample_cols) {
+    EngineParams p = small_params();
+    p.mask.enabled = false;
+    p.track.sample_cols = sample_cols;
+    Rig rig(p);
+    rig.add(view, {}, 3);
+    const auto tracked = [&](const CornerView& seen) {
+      EXPECT_EQ(rig.engine->prepare(frame_of(seen)).status, Status::ok);
+      const TrackResult result = rig.engine->refine(T_start);
+      EXPECT_EQ(result.status, Status::ok);
+      return result.T_world_cam;
+    };
+    const Se3 T = tracked(view);
+    EXPECT_LT(norm(T.translation), 0.003f) << sample_cols;
+    return !same_bytes(T, tracked(spoiled));
+  };
+  EXPECT_FALSE(spoils(kWidth / 2));
+  EXPECT_TRUE(spoils(kWidth));
+  EXPECT_TRUE(spoils(0));
+}
+
 TEST(CpuEngine, TrackingWithoutAMapIsDegenerateAndLeavesThePose) {
   const Rig rig(paper_params());
   ASSERT_EQ(rig.engine->prepare(frame_of(CornerView({}, corner_camera(kWidth), {}))).status, Status::ok);
