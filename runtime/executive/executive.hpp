@@ -39,14 +39,14 @@ struct ExecutiveParts {
   MessageBus* bus = nullptr;
   CommandPort* commands = nullptr;
   ServiceManager* service = nullptr;
-  std::vector<FrameObserver*> observers;
-  std::function<bool()> stop_requested;  ///< a signal came
+  std::vector<FrameObserver*> observers = {};
+  std::function<bool()> stop_requested = {};  ///< a signal came
   /// Told of the newest status some times a second.  @thread supervisor
-  std::function<void(const StatusMessage&)> on_status;
+  std::function<void(const StatusMessage&)> on_status = {};
   /// save_mesh: a mesh from the map that was just saved. @return the error, or empty.  @thread its own
-  std::function<std::string(const std::string& file)> make_mesh;
+  std::function<std::string(const std::string& file)> make_mesh = {};
   /// save_map under another name. @return the error, or empty.  @thread supervisor
-  std::function<std::string(const std::string& file)> keep_map;
+  std::function<std::string(const std::string& file)> keep_map = {};
 };
 
 struct ExecutiveOptions {

@@ -10,9 +10,6 @@
 
 namespace stillmap {
 
-inline constexpr const char* kPoseChannel = "STILLMAP_POSE";
-inline constexpr const char* kStatusChannel = "STILLMAP_STATUS";
-inline constexpr const char* kRangeChannel = "STILLMAP_RANGE";
 
 /// The newest value, from one thread to another; neither waits for the other.
 template <class T>
