@@ -67,9 +67,9 @@ TEST(LoadShedder, WhatWasShedComesBackWhenThereIsRoom) {
   LoadShedder load;
   run(load, {60, 35, 20}, 120);
   ASSERT_EQ(load.shed(), Shed::finest_level);
-  run(load, {20, 12, 8}, LoadShedder::kPatience + LoadShedder::kWindow);
+  run(load, {20, 12, 8}, LoadShedder::kPatience);
   EXPECT_EQ(load.shed(), Shed::every_second_integration);
-  run(load, {20, 12, 8}, LoadShedder::kPatience + LoadShedder::kWindow);
+  run(load, {20, 12, 8}, LoadShedder::kPatience);
   EXPECT_EQ(load.shed(), Shed::nothing);
 }
 
