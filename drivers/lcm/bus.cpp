@@ -33,11 +33,9 @@ class Membership {
  private:
   void join() { holds_.store(join_group(socket_, group_), std::memory_order_relaxed); }
   void keep(const std::stop_token& stop) {
-    std::mutex mutex;
-    std::condition_variable_any never;
-    std::unique_lock lock(mutex);
+    std::unique_lock lock(mutex_);
     while (!stop.stop_requested()) {
-      never.wait_for(lock, stop, kJoinEvery, [] { return false; });
+      never_.wait_for(lock, stop, kJoinEvery, [] { return false; });
       join();
     }
   }
@@ -45,6 +43,8 @@ class Membership {
   const UdpSocket& socket_;
   uint32_t group_;
   std::atomic<bool> holds_{false};
+  std::mutex mutex_;
+  std::condition_variable_any never_;  ///< nothing but the stop wakes it up; allocates when it is made
   std::jthread thread_;  ///< last: it uses all the others
 };
 

@@ -1,12 +1,15 @@
 // The other ends of the network for lcm_test.py. Says "ready" once it listens or is about to publish, and
 // what it saw when it is done.
 //
-//   lcm_probe publish URL COUNT HZ        our codec and bus: a status and a pose each; pose n is at x = n
-//   lcm_probe bot-core URL SECONDS        LCM's library and bot_core.pose_t alone: the poses that came within
-//   the time lcm_probe commands URL SECONDS        our subscriber lcm_probe odometry URL SECONDS        our
-//   subscriber
+//   lcm_probe publish URL COUNT HZ    our codec and bus: a status and a pose each; pose n is at x = n
+//   lcm_probe bot-core URL            LCM's library and bot_core.pose_t alone
+//   lcm_probe commands URL            our subscriber
+//   lcm_probe odometry URL            our subscriber
+//
+// Listeners end when their standard input does and nothing has come for a while.
 
 #include <lcm/lcm.h>
+#include <poll.h>
 
 #include <algorithm>
 #include <bot_core/pose_t.hpp>
@@ -33,6 +36,21 @@ void say_ready() {
   std::puts("ready");
   std::fflush(stdout);
 }
+
+/// Goes on as long as standard input is open, and then until nothing came for a while.
+class Patience {
+ public:
+  bool goes_on() {
+    pollfd input{0, POLLIN, 0};
+    if (poll(&input, 1, 0) == 0) something_came();
+    return seconds_since(last_) < kWhileS;
+  }
+  void something_came() { last_ = Clock::now(); }
+
+ private:
+  static constexpr double kWhileS = 0.3;
+  Clock::time_point last_ = Clock::now();
+};
 
 int publish(const std::string& url, int count, double hz) {
   const auto bus = open_lcm_bus(url);
@@ -79,13 +97,14 @@ struct Poses {
   }
 };
 
-int hear_bot_core(const std::string& url, double for_s) {
+int hear_bot_core(const std::string& url) {
   lcm_t* lcm = lcm_create(url.c_str());
   if (!lcm) return 1;
   Poses poses;
   lcm_subscribe(lcm, kPoseChannel, Poses::hear, &poses);
   say_ready();
-  for (const auto start = Clock::now(); seconds_since(start) < for_s;) lcm_handle_timeout(lcm, 50);
+  for (Patience patience; patience.goes_on();)
+    if (lcm_handle_timeout(lcm, 50) > 0) patience.something_came();
   lcm_destroy(lcm);
   std::printf("poses %zu first %d last %d wrong %d\n", poses.places.size(),
               poses.places.empty() ? -1 : *poses.places.begin(),
@@ -93,32 +112,32 @@ int hear_bot_core(const std::string& url, double for_s) {
   return 0;
 }
 
-int hear_commands(const std::string& url, double for_s) {
+int hear_commands(const std::string& url) {
   const auto commands = open_lcm_commands(url);
   if (!commands) return std::fprintf(stderr, "%s\n", commands.error().c_str()), 1;
   say_ready();
-  for (const auto start = Clock::now(); seconds_since(start) < for_s;) {
+  for (Patience patience; patience.goes_on(); std::this_thread::sleep_for(std::chrono::milliseconds(5))) {
     CommandMessage command;
-    while ((*commands)->next(command) == Status::ok)
+    while ((*commands)->next(command) == Status::ok) {
       std::printf("command %u kind %d file '%s'\n", command.id, static_cast<int>(command.command),
                   command.file.data());
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      std::fflush(stdout);
+      patience.something_came();
+    }
   }
   std::printf("refused %u\n", (*commands)->refused());
   return 0;
 }
 
-int hear_odometry(const std::string& url, double for_s) {
+int hear_odometry(const std::string& url) {
   const auto odometry = open_lcm_odometry(url, [](Utime utime) { return Stamp{1000 * utime.us}; });
   if (!odometry) return std::fprintf(stderr, "%s\n", odometry.error().c_str()), 1;
   say_ready();
   OdometrySample sample;
   const Stamp far_ahead{int64_t{1} << 62};
   bool any = false;
-  for (const auto start = Clock::now(); seconds_since(start) < for_s;) {
+  for (Patience patience; patience.goes_on(); std::this_thread::sleep_for(std::chrono::milliseconds(5)))
     any = (*odometry)->at(far_ahead, sample) == Status::ok || any;
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  }
   std::printf("%s x %.3f refused %u\n", any ? "odometry" : "none", sample.T_odom_body.translation.x,
               (*odometry)->refused());
   return 0;
@@ -127,9 +146,9 @@ int hear_odometry(const std::string& url, double for_s) {
 int probe(int argc, char** argv) {
   const std::string mode = argc > 1 ? argv[1] : "";
   if (argc == 5 && mode == "publish") return publish(argv[2], std::atoi(argv[3]), std::atof(argv[4]));
-  if (argc == 4 && mode == "bot-core") return hear_bot_core(argv[2], std::atof(argv[3]));
-  if (argc == 4 && mode == "commands") return hear_commands(argv[2], std::atof(argv[3]));
-  if (argc == 4 && mode == "odometry") return hear_odometry(argv[2], std::atof(argv[3]));
+  if (argc == 3 && mode == "bot-core") return hear_bot_core(argv[2]);
+  if (argc == 3 && mode == "commands") return hear_commands(argv[2]);
+  if (argc == 3 && mode == "odometry") return hear_odometry(argv[2]);
   std::fputs("lcm_probe publish|bot-core|commands|odometry URL ...\n", stderr);
   return 2;
 }

@@ -1,9 +1,10 @@
 """The LCM face over real UDP multicast: in network namespaces of the test's own, so that nothing leaves the machine,
 against LCM's library, lcm-logger and lcm-logplayer.
 
-    lcm_test.py STILLMAP LCM_PROBE      77: namespaces are not permitted here
+    lcm_test.py STILLMAP LCM_PROBE [TEST]...      77: namespaces are not permitted here
 """
 
+import concurrent.futures
 import os
 import pathlib
 import pty
@@ -12,7 +13,6 @@ import re
 import select
 import shutil
 import signal
-import socket
 import struct
 import subprocess
 import sys
@@ -22,8 +22,10 @@ import unittest
 
 URL = "udpm://239.255.76.67:7667?ttl=0"
 URL_OF_NETWORK = "udpm://239.255.76.67:7667?ttl=1"
+PATIENT_URL = URL + "&recv_buf_size=4194304"
 GROUP = ("239.255.76.67", 7667)
 PATIENCE_S = 60
+AT_A_TIME = 5
 
 STILLMAP = PROBE = ""
 
@@ -57,9 +59,9 @@ class Host:
     def route(self, device):
         self.do("ip", "route", "add", "224.0.0.0/4", "dev", device)
 
-    def start(self, *command, ready=False, **options):
-        program = subprocess.Popen(self.within(*command), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                                   **options)
+    def start(self, *command, ready=False):
+        program = subprocess.Popen(self.within(*command), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE, text=True)
         self.programs.append(program)
         if ready:
             line = program.stdout.readline()
@@ -87,7 +89,7 @@ def two_hosts():
 
 
 def end_of(program):
-    """(exit code, output) once it is done."""
+    """(exit code, output) once it is done; listeners end when their input does."""
     out, errors = program.communicate(timeout=PATIENCE_S)
     return program.returncode, out + errors
 
@@ -111,13 +113,12 @@ def command(number, kind=4, name=""):
 
 
 SENDER = """
-import socket, sys
+import socket, sys, time
 out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-out.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
-import time
+out.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 1)
 for line in sys.stdin:
     out.sendto(bytes.fromhex(line), ("%s", %d))
-    time.sleep(0.0001)
+    time.sleep(0.001)
 """ % GROUP
 
 
@@ -155,7 +156,7 @@ def wrong_datagrams(channel, good, count, seed=5):
 class Published(unittest.TestCase):
     def test_who_knows_only_bot_core_hears_the_poses(self):
         with Host() as host:
-            listener = host.probe("bot-core", URL, 2)
+            listener = host.probe("bot-core", URL)
             self.assertEqual(result(host.probe("publish", URL, 100, 100))["unavailable"], 0)
             self.assertEqual(result(listener), {"poses": 100, "first": 0, "last": 99, "wrong": 0})
 
@@ -167,14 +168,16 @@ class Published(unittest.TestCase):
             while not log.exists() or log.stat().st_size == 0:  # until it listens
                 self.assertLess(time.monotonic(), give_up)
                 result(host.probe("publish", URL, 1, 20))
-            recorded_before = 100
-            result(host.probe("publish", URL, recorded_before, 200))
-            time.sleep(0.3)  # it writes to the disk ten times a second
+            before = log.read_bytes().count(b"STILLMAP_POSE")
+            result(host.probe("publish", URL, 100, 200))
+            while log.read_bytes().count(b"STILLMAP_POSE") < before + 100:
+                self.assertLess(time.monotonic(), give_up)
+                result(host.probe("publish", URL, 1, 20))  # it writes out what it has when the next comes
             logger.send_signal(signal.SIGINT)
             end_of(logger)
             self.assertIn(b"STILLMAP_STATUS", log.read_bytes())
 
-            listener = host.probe("bot-core", URL, 2.5)
+            listener = host.probe("bot-core", URL)
             player = host.start("lcm-logplayer", "--speed=2", "--lcm-url=" + URL, log)
             self.assertEqual(end_of(player)[0], 0)
             self.assertEqual(result(listener), {"poses": 100, "first": 0, "last": 99, "wrong": 0})
@@ -182,33 +185,33 @@ class Published(unittest.TestCase):
     def test_two_hosts_hear_each_other_with_ttl_1_only(self):
         robot, ground = two_hosts()
         with robot, ground:
-            far, near = ground.probe("bot-core", URL_OF_NETWORK, 3), robot.probe("bot-core", URL, 3)
+            far, near = ground.probe("bot-core", URL_OF_NETWORK), robot.probe("bot-core", URL)
             result(robot.probe("publish", URL, 50, 100))  # ttl 0: x = 0..49 stays
             result(robot.probe("publish", URL_OF_NETWORK, 60, 100))
             self.assertEqual(result(near)["poses"], 60)
             self.assertEqual(result(far)["poses"], 60, "all of ttl 1")
             # Linux sends datagrams of ttl 0 as any other where nobody on the device is a member of the group.
-            far = ground.probe("bot-core", URL_OF_NETWORK, 1.5)
+            far = ground.probe("bot-core", URL_OF_NETWORK)
             self.assertEqual(result(robot.probe("publish", URL, 50, 100))["sent"], 100)
             self.assertEqual(result(far)["poses"], 0, "none of ttl 0")
 
     def test_no_route_and_one_that_comes_later(self):
         with Host(multicast_by=None) as host:
-            publisher = host.probe("publish", URL, 200, 100)
-            time.sleep(0.5)
+            publisher = host.probe("publish", URL, 400, 100)
+            time.sleep(0.7)
             host.route("lo")
-            heard = result(host.probe("bot-core", URL, 2))
-            sent = result(publisher)
+            listener = host.probe("bot-core", URL)  # LCM's library, unlike ours, needs the route at its start
+            sent, heard = result(publisher), result(listener)
             self.assertGreater(sent["unavailable"], 50)
             self.assertGreater(sent["sent"], 50)
             self.assertGreater(heard["poses"], 25)
-            self.assertEqual(heard["last"], 199)
+            self.assertEqual(heard["last"], 399)
 
     def test_a_link_that_goes_down_and_comes_back(self):
         robot, ground = two_hosts()
         with robot, ground:
-            listener = ground.probe("bot-core", URL_OF_NETWORK, 4)
-            publisher = robot.probe("publish", URL_OF_NETWORK, 300, 100)
+            listener = ground.probe("bot-core", URL_OF_NETWORK)
+            publisher = robot.probe("publish", URL_OF_NETWORK, 400, 100)
             time.sleep(0.7)
             robot.do("ip", "link", "set", "robot0", "down")
             time.sleep(0.7)
@@ -216,15 +219,21 @@ class Published(unittest.TestCase):
             robot.route("robot0")  # it went with the link
             sent, heard = result(publisher), result(listener)
             self.assertGreater(sent["unavailable"], 60)
-            self.assertEqual((heard["first"], heard["last"], heard["wrong"]), (0, 299, 0))
+            self.assertEqual((heard["first"], heard["last"], heard["wrong"]), (0, 399, 0))
             self.assertGreater(heard["poses"], 100)
             self.assertLess(sent["longest_ms"], 500)
+
+    def slow_down(self, robot, queue_bytes):
+        try:
+            robot.do("tc", "qdisc", "add", "dev", "robot0", "root", "tbf", "rate", "200kbit", "burst", "4k", "limit",
+                     queue_bytes)
+        except subprocess.CalledProcessError as error:
+            self.skipTest("this kernel has no tbf: " + error.stderr)
 
     def test_a_slow_link_makes_nobody_wait(self):
         robot, ground = two_hosts()
         with robot, ground:
-            robot.do("tc", "qdisc", "add", "dev", "robot0", "root", "tbf", "rate", "200kbit", "burst", "4k", "limit",
-                     "10m")  # it keeps what it cannot send; LCM's own publish waits for seconds here
+            self.slow_down(robot, "10m")  # it keeps what it cannot send; LCM's own publish waits for seconds here
             sent = result(robot.probe("publish", URL_OF_NETWORK, 1000, 1000))
             self.assertGreater(sent["unavailable"], 0)
             self.assertLess(sent["longest_ms"], 500)
@@ -232,9 +241,8 @@ class Published(unittest.TestCase):
     def test_loss(self):
         robot, ground = two_hosts()
         with robot, ground:
-            robot.do("tc", "qdisc", "add", "dev", "robot0", "root", "tbf", "rate", "200kbit", "burst", "4k", "limit",
-                     "4k")  # it throws away what it cannot send
-            listener = ground.probe("bot-core", URL_OF_NETWORK, 2.5)
+            self.slow_down(robot, "4k")  # it throws away what it cannot send
+            listener = ground.probe("bot-core", URL_OF_NETWORK)
             result(robot.probe("publish", URL_OF_NETWORK, 200, 200))
             heard = result(listener)
             self.assertGreater(heard["poses"], 10)
@@ -243,34 +251,45 @@ class Published(unittest.TestCase):
 
 
 class Heard(unittest.TestCase):
+    def assert_counted(self, text, named):
+        """On a busy machine the system may lose some before anybody sees them; network_test counts exactly."""
+        refused = numbers(text)["refused"]
+        self.assertLessEqual(refused, named)
+        self.assertGreater(refused, 0.8 * named)
+
     def test_foreign_and_broken_messages_do_no_harm(self):
         good = command(41, kind=2, name="hall.ply")
         payload = good[good.index(b"\0", 8) + 1:]
-        wrong, named = wrong_datagrams(b"STILLMAP_COMMAND", payload, 3000)
+        wrong, named = wrong_datagrams(b"STILLMAP_COMMAND", payload, 1200)
         with Host() as host:
-            listener = host.probe("commands", URL, 5)
+            listener = host.probe("commands", PATIENT_URL)
             send(host, [command(40), *wrong, good])
             code, text = end_of(listener)
         self.assertEqual(code, 0)
-        self.assertEqual(text.splitlines(), ["command 40 kind 4 file ''", "command 41 kind 2 file 'hall.ply'",
-                                             f"refused {named}"])
+        *commands, refused = text.splitlines()
+        self.assertEqual(commands, ["command 40 kind 4 file ''", "command 41 kind 2 file 'hall.ply'"])
+        self.assert_counted(refused, named)
 
     def test_odometry_among_broken_messages(self):
         pose = struct.pack(">Qq16d", 0x2E16EFB052B0105E, 10 ** 15, 1.25, 0, 0, 0, 0, 0, 1, *[0.0] * 9)
         good = b"LC02" + struct.pack(">I", 1) + b"ODOMETRY\0" + pose
         wrong, named = wrong_datagrams(b"ODOMETRY", pose, 600)
         with Host() as host:
-            listener = host.probe("odometry", URL, 2)
+            listener = host.probe("odometry", PATIENT_URL)
             send(host, [*wrong, good])
             code, text = end_of(listener)
-        self.assertEqual((code, text), (0, f"odometry x 1.250 refused {named}\n"))
+        self.assertEqual(code, 0)
+        self.assertTrue(text.startswith("odometry x 1.250 refused "), text)
+        self.assert_counted(text, named)
 
     def test_a_host_without_multicast_joins_when_it_comes(self):
         with Host(multicast_by=None) as host:
-            listener = host.probe("commands", URL, 4)
+            listener = host.probe("commands", URL)
             host.route("lo")
-            time.sleep(1.5)  # it looks once a second
-            send(host, [command(9)])
+            give_up = time.monotonic() + PATIENCE_S
+            while not select.select([listener.stdout], [], [], 0.2)[0]:  # it looks once a second
+                self.assertLess(time.monotonic(), give_up)
+                send(host, [command(9)])
             self.assertIn("command 9 ", end_of(listener)[1])
 
 
@@ -294,7 +313,7 @@ class Top(unittest.TestCase):
         self.assertTrue(line.startswith(self.LINE.format(rate.group(1))), line)
         self.assertGreater(float(rate.group(1)), 30)
         self.assertLess(float(rate.group(1)), 110)
-        # 0x8000000000C00005: two of ours, two that this program has no name for... or its last ones
+        # 0x8000000000C00005: bits 0, 2, 22, 23 and 63, which only a newer program has a name for
         self.assertIn("bad_frame 100 now, camera_gone 102, range_lost 122 now, range_stuck 123", line)
         self.assertIn("fault 63", line)
 
@@ -365,14 +384,37 @@ def may_make_networks():
     return True
 
 
+def names_of(suite):
+    for test in suite:
+        yield from names_of(test) if isinstance(test, unittest.TestSuite) else [test.id().partition(".")[2]]
+
+
+def run_all():
+    """Each test in a process of its own, several at a time: they wait most of their time. True: all passed."""
+    def run_one(name):
+        return subprocess.run([sys.executable, *sys.argv[:3], name], capture_output=True, text=True)
+
+    names = list(names_of(unittest.defaultTestLoader.loadTestsFromModule(sys.modules["__main__"])))
+    with concurrent.futures.ThreadPoolExecutor(AT_A_TIME) as pool:
+        done = list(pool.map(run_one, names))
+    for name, one in zip(names, done):
+        print("ok    " if one.returncode == 0 else "FAILED", name)
+        if one.returncode != 0 or "skipped" in one.stderr:
+            print(one.stderr)
+    return bool(names) and all(one.returncode == 0 for one in done)
+
+
 if __name__ == "__main__":
     STILLMAP, PROBE = (str(pathlib.Path(path).resolve()) for path in sys.argv[1:3])
-    missing = [tool for tool in ["unshare", "nsenter", "ip", "tc", "lcm-logger", "lcm-logplayer"] if not shutil.which(tool)]
+    tools = ["unshare", "nsenter", "ip", "tc", "lcm-logger", "lcm-logplayer"]
+    missing = [tool for tool in tools if not shutil.which(tool)]
     if missing:
         sys.exit("not installed: " + " ".join(missing))
     if not may_make_networks():
-        if os.geteuid() == 0:
+        if os.geteuid() == 0 or subprocess.run(["unshare", "-rn", "true"], capture_output=True).returncode != 0:
             print("network namespaces are not permitted here")
             sys.exit(77)
         os.execvp("unshare", ["unshare", "-rn", sys.executable, *sys.argv])
-    unittest.main(argv=sys.argv[:1] + sys.argv[3:], verbosity=2)
+    if len(sys.argv) == 3:
+        sys.exit(0 if run_all() else 1)
+    unittest.main(argv=sys.argv[:1] + sys.argv[3:])

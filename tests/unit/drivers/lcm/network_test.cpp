@@ -221,7 +221,7 @@ TEST_F(LcmNetwork, CommandsAreHeardOnceThereIsARoute) {
   auto commands = open_lcm_commands(kLcmDefaultUrl);
   ASSERT_TRUE(commands) << commands.error();
   PrivateNetwork::add_multicast_route();
-  auto bus = open_lcm_bus(kLcmDefaultUrl);
+  auto bus = open_lcm_bus("udpm://239.255.76.67:7667?ttl=1");  // with ttl 0 it would be a member itself
   ASSERT_TRUE(bus) << bus.error();
   CommandMessage command;
   EXPECT_TRUE(eventually([&] {
