@@ -13,12 +13,15 @@
 #include <thread>
 
 #include "config/engine_params.hpp"
+#include "drivers/lcm/lcm.hpp"
 #include "drivers/registry.hpp"
 #include "runtime/archive/block_archive.hpp"
 #include "runtime/archive/map_saver.hpp"
 #include "runtime/core/heap_guard.hpp"
 #include "runtime/pipeline/pipeline.hpp"
 #include "tests/support/frame_memory.hpp"
+#include "tests/support/private_network.hpp"
+#include "tests/support/sample_messages.hpp"
 #include "tests/support/temp_dir.hpp"
 
 namespace stillmap {
@@ -193,6 +196,38 @@ TEST_F(RealTimeLoop, DoesNotAllocateWhileLostAndFindingItselfAgain) {
   EXPECT_EQ(allocations_, 0u);
   EXPECT_GE(pipeline_->counters().lost_frames, 3u);
   EXPECT_EQ(pipeline_->counters().relocalised, 1u);
+}
+
+// Of all threads: whoever publishes, the listeners' own, and whoever asks for odometry and commands.
+TEST(LcmFace, DoesNotAllocateOnceItIsOpen) {
+  if (PrivateNetwork::enter()) PrivateNetwork::add_multicast_route();
+  const auto codec = make_lcm_codec();
+  auto bus = open_lcm_bus(kLcmDefaultUrl);
+  auto commands = open_lcm_commands(kLcmDefaultUrl);
+  auto odometry = open_lcm_odometry(kLcmDefaultUrl, [](Utime utime) { return Stamp{utime.us * 1000}; });
+  ASSERT_TRUE(bus && commands && odometry);
+  uint8_t bytes[kDatagramBytes];
+  uint32_t heard = 0;
+  const auto send = [&](const char* channel, const auto& message) {
+    return (*bus)->publish(channel, {bytes, codec->encode(message, {bytes, kDatagramBytes})});
+  };
+  PoseMessage pose = samples::pose();
+  Status sent = Status::ok;
+  EXPECT_EQ(allocations_of([&] {
+              for (int i = 0; i < 1000; ++i) {
+                pose.utime.us += 1000;
+                sent = send(kPoseChannel, pose);
+                send(kStatusChannel, samples::status());
+                send(kCommandChannel, samples::command());
+                send(kOdometryChannel, pose);
+                CommandMessage command;
+                OdometrySample sample;
+                heard += (*commands)->next(command) == Status::ok;
+                heard += (*odometry)->at({pose.utime.us * 1000}, sample) == Status::ok;
+              }
+            }),
+            0u);
+  EXPECT_TRUE(sent == Status::unavailable || heard > 100u) << heard;  // hosts without multicast hear nothing
 }
 
 }  // namespace

@@ -144,6 +144,16 @@ TEST_F(LcmNetwork, TheBusGoesOnWithoutARouteAndFindsOneThatComesBack) {
   const Bytes pose = encoded(samples::pose());
   for (int i = 0; i < 3; ++i) EXPECT_EQ((*bus)->publish(kPoseChannel, view_of(pose)), Status::unavailable);
   PrivateNetwork::add_multicast_route();
+  EXPECT_TRUE(eventually([&] { return (*bus)->publish(kPoseChannel, view_of(pose)) == Status::ok; }));
+}
+
+TEST_F(LcmNetwork, WithATtlTheBusFindsARouteAtOnce) {
+  PrivateNetwork::remove_multicast_route();
+  auto bus = open_lcm_bus("udpm://239.255.76.67:7667?ttl=1");
+  ASSERT_TRUE(bus) << bus.error();
+  const Bytes pose = encoded(samples::pose());
+  EXPECT_EQ((*bus)->publish(kPoseChannel, view_of(pose)), Status::unavailable);
+  PrivateNetwork::add_multicast_route();
   EXPECT_EQ((*bus)->publish(kPoseChannel, view_of(pose)), Status::ok);
 }
 
@@ -211,11 +221,11 @@ TEST_F(LcmNetwork, CommandsAreHeardOnceThereIsARoute) {
   auto commands = open_lcm_commands(kLcmDefaultUrl);
   ASSERT_TRUE(commands) << commands.error();
   PrivateNetwork::add_multicast_route();
-  auto bus = open_lcm_bus(kLcmDefaultUrl);
+  auto bus = open_lcm_bus("udpm://239.255.76.67:7667?ttl=1");  // with ttl 0 it would be a member itself
   ASSERT_TRUE(bus) << bus.error();
   CommandMessage command;
   EXPECT_TRUE(eventually([&] {
-    EXPECT_EQ((*bus)->publish(kCommandChannel, view_of(encoded(samples::command()))), Status::ok);
+    (void)(*bus)->publish(kCommandChannel, view_of(encoded(samples::command())));
     return (*commands)->next(command) == Status::ok;
   }));
 }
