@@ -27,10 +27,10 @@ std::string add_report(const std::string& path, AccuracyFigures& figures) {
   std::ifstream file(path);
   const Json json = Json::parse(file, nullptr, /*allow_exceptions=*/false);
   if (json.is_discarded()) return path + ": cannot be read";
-  figures.frames = json.value("frames", AccuracyFigures::kUnknown);
-  figures.lost_frames = json.value("lost_frames", AccuracyFigures::kUnknown);
-  figures.masked_fraction_mean = json.value("masked_fraction_mean", AccuracyFigures::kUnknown);
-  figures.total_ms_p50 = json.value("/ms/total/p50"_json_pointer, AccuracyFigures::kUnknown);
+  figures.frames = json.value("frames", kUnknown);
+  figures.lost_frames = json.value("lost_frames", kUnknown);
+  figures.masked_fraction_mean = json.value("masked_fraction_mean", kUnknown);
+  figures.total_ms_p50 = json.value("/ms/total/p50"_json_pointer, kUnknown);
   return {};
 }
 

@@ -7,7 +7,7 @@ namespace stillmap {
 namespace {
 
 double worst_of(const std::vector<double>& values, Worst worst) {
-  double found = AccuracyFigures::kUnknown;
+  double found = kUnknown;
   for (const double v : values) {
     if (std::isnan(v)) continue;
     found = std::isnan(found) ? v : worst == Worst::highest ? std::max(found, v) : std::min(found, v);
@@ -34,7 +34,7 @@ AccuracySummary summary_of(const std::vector<const AccuracyRun*>& runs) {
 
 double median_of(std::vector<double> values) {
   std::erase_if(values, [](double v) { return std::isnan(v); });
-  if (values.empty()) return AccuracyFigures::kUnknown;
+  if (values.empty()) return kUnknown;
   std::sort(values.begin(), values.end());
   const size_t middle = values.size() / 2;
   return values.size() % 2 == 1 ? values[middle] : 0.5 * (values[middle - 1] + values[middle]);

@@ -3,9 +3,10 @@
 // The figures of `stillmap bench accuracy`: of one run, and of all runs of a scene.
 
 #include <cstdint>
-#include <limits>
 #include <string>
 #include <vector>
+
+#include "runtime/evaluate/statistics.hpp"
 
 namespace stillmap {
 
@@ -14,8 +15,6 @@ enum class Worst : uint8_t { highest, lowest };
 
 /// What one run came to; NaN: unknown (a recording has no true mask). Counts are whole numbers.
 struct AccuracyFigures {
-  static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-
   double frames = kUnknown, lost_frames = kUnknown;
   double ate_rmse_m = kUnknown;                           ///< SE(3) alignment
   double ate_to_twin = kUnknown;                          ///< over that of the static twin with the same seed

@@ -10,8 +10,6 @@
 namespace stillmap {
 namespace {
 
-constexpr double kUnknown = AccuracyFigures::kUnknown;
-
 /// One value against one limit; `excess` above 0 misses the bar.
 struct Case {
   std::string scene;
@@ -315,7 +313,7 @@ double dynamic_mean_m(const std::vector<AccuracyRun>& runs, const std::string& p
     sum += std::log(scene.median.ate_rmse_m);
     ++count;
   }
-  return count > 0 ? std::exp(sum / count) : AccuracyFigures::kUnknown;
+  return count > 0 ? std::exp(sum / count) : kUnknown;
 }
 
 }  // namespace stillmap

@@ -1,15 +1,15 @@
 #include "runtime/evaluate/pose_score.hpp"
 
 #include <cmath>
-#include <limits>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 
+#include "runtime/evaluate/statistics.hpp"
+
 namespace stillmap {
 namespace {
 
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 constexpr double kDegPerRad = 57.29577951308232;
 
 /// Mean of transformations that lie near to each other.

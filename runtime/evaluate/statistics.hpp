@@ -1,9 +1,13 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 namespace stillmap {
+
+/// A figure that could not be measured: not a number.
+inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 /// Of a list of errors, in their unit. As the TUM benchmark's scripts compute them: `std` divides by n, the
 /// median of an even number is the mean of the middle two.

@@ -1,15 +1,13 @@
 #include "runtime/evaluate/truth_observer.hpp"
 
 #include <algorithm>
-#include <limits>
 
 #include "kernels/engine.hpp"
+#include "runtime/evaluate/statistics.hpp"
 #include "runtime/pipeline/pipeline.hpp"
 
 namespace stillmap {
 namespace {
-
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 double share(int64_t part, int64_t all) {
   return all == 0 ? kUnknown : static_cast<double>(part) / static_cast<double>(all);

@@ -147,7 +147,7 @@ Result<Done> write_ate(const std::string& path, const std::vector<AccuracyRun>& 
     for (size_t p = 0; p < presets.size(); ++p) {
       const AccuracySummary* s = find(summaries, groups[g].scene, presets[p]);
       const AccuracySummary* twin = find(summaries, groups[g].twin, presets[p]);
-      const double none = AccuracyFigures::kUnknown;
+      const double none = kUnknown;
       chart.bar(g, p, presets.size(), s ? 100 * s->median.ate_rmse_m : none,
                 s && s->runs > 1 ? 100 * s->worst.ate_rmse_m : none,
                 twin ? 100 * twin->median.ate_rmse_m : none);
@@ -172,7 +172,7 @@ Result<Done> write_iou(const std::string& path, const std::vector<AccuracyRun>& 
     chart.name(g, groups[g].scene);
     for (size_t p = 0; p < presets.size(); ++p) {
       const AccuracySummary* s = find(summaries, groups[g].scene, presets[p]);
-      const double none = AccuracyFigures::kUnknown;
+      const double none = kUnknown;
       chart.bar(g, p, presets.size(), s ? 100 * s->median.mask_iou : none,
                 s && s->runs > 1 ? 100 * s->worst.mask_iou : none, none);
     }

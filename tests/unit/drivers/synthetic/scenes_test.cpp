@@ -15,7 +15,7 @@
 namespace stillmap::synthetic {
 namespace {
 
-constexpr Intrinsics kCamera = {65.625f, 65.625f, 39.5f, 29.5f, 80, 60};
+constexpr Intrinsics kSceneCamera = {65.625f, 65.625f, 39.5f, 29.5f, 80, 60};
 constexpr double kFrame_s = 1.0 / 30.0;
 
 /// Shares of the pixels of one instant.
@@ -27,7 +27,7 @@ struct Shares {
 
 std::vector<Shares> shares_over(const Scene& scene, double step_s) {
   ThreadPool workers(2);
-  Renderer renderer(kCamera);
+  Renderer renderer(kSceneCamera);
   IdealImages images;
   std::vector<Shares> all;
   for (double t = 0; t < scene.default_seconds; t += step_s) {
@@ -109,7 +109,7 @@ TEST_P(EveryScene, starts_still_unless_it_must_not) {
   const std::string name = scene.name;
   const bool from_the_start = name == "crowd_start" || name == "person_tracking";
   ThreadPool workers(1);
-  Renderer renderer(kCamera);
+  Renderer renderer(kSceneCamera);
   IdealImages images;
   for (double t = 0; t <= 1.0; t += 0.2) {
     renderer.render(world_at(scene, t, false), scene.camera(t), workers, images);
@@ -256,14 +256,14 @@ Grip grip_of(const IdealImages& images, const World& world, const Se3d& T_world_
   constexpr int32_t kStep = 3;
   const Se3 T = cast<float>(T_world_cam);
   int rays = 0, measured = 0, across = 0;
-  for (int32_t row = 0; row < kCamera.height; row += kStep)
-    for (int32_t col = 0; col < kCamera.width; col += kStep) {
+  for (int32_t row = 0; row < kSceneCamera.height; row += kStep)
+    for (int32_t col = 0; col < kSceneCamera.width; col += kStep) {
       ++rays;
-      const auto i = static_cast<size_t>(row * kCamera.width + col);
+      const auto i = static_cast<size_t>(row * kSceneCamera.width + col);
       const float depth_m = images.depth_m[i];
       if (depth_m < kDepthMinM || depth_m > kDepthMaxM || images.cos_incidence[i] < 0.2f) continue;
       ++measured;
-      const Vec3 p = T * unproject(kCamera, static_cast<float>(col), static_cast<float>(row), depth_m);
+      const Vec3 p = T * unproject(kSceneCamera, static_cast<float>(col), static_cast<float>(row), depth_m);
       float off_m = 1e9f;
       for (const Shape& shape : world.shapes)
         off_m = std::min(off_m, std::abs(distance_m(shape, p + Vec3{0.02f, 0, 0})));
@@ -276,7 +276,7 @@ TEST(Scenes, corridor_never_shows_bare_walls_only) {
   const Scene& scene = scene_named("corridor");
   const World world = world_at(scene, 0, false);
   ThreadPool workers(1);
-  Renderer renderer(kCamera);
+  Renderer renderer(kSceneCamera);
   IdealImages images;
   for (double t = 0; t < scene.default_seconds; t += 1.0) {
     renderer.render(world, scene.camera(t), workers, images);

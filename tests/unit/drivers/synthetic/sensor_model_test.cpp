@@ -11,7 +11,7 @@ namespace stillmap::synthetic {
 namespace {
 
 constexpr int32_t kCols = 320, kRows = 64;
-constexpr Intrinsics kCamera = {525.0f, 525.0f, 159.5f, 31.5f, kCols, kRows};
+constexpr Intrinsics kSensorCamera = {525.0f, 525.0f, 159.5f, 31.5f, kCols, kRows};
 constexpr float kUnits = 5000.0f;
 
 struct Measured {
@@ -39,7 +39,7 @@ IdealImages ideal(const DepthOf& depth_m, float cos_incidence = 1.0f) {
 Measured measure(const IdealImages& images, uint32_t frame = 0, double t_s = 0) {
   Measured out;
   ThreadPool workers(1);
-  SensorModel sensor(kCamera, kUnits, 7);
+  SensorModel sensor(kSensorCamera, kUnits, 7);
   sensor.measure(images, frame, t_s, workers, {out.depth.data(), kRows, kCols, kCols},
                  {out.colour.data(), kRows, kCols, kCols});
   return out;
@@ -192,7 +192,7 @@ TEST(SensorModel, colour_noise_is_2_to_3_grey_levels_and_exposure_drifts_slowly)
   }
   const double mean = sum / (kCols * kRows);
   EXPECT_NEAR(std::sqrt(sum2 / (kCols * kRows) - mean * mean), 2.5, 0.3);
-  const SensorModel sensor(kCamera, kUnits, 7);
+  const SensorModel sensor(kSensorCamera, kUnits, 7);
   EXPECT_NEAR(mean, 150.0 * static_cast<double>(sensor.exposure(0)), 0.2);
   float low = 2, high = 0;
   for (int i = 0; i < 600; ++i) {

@@ -258,17 +258,21 @@ TEST(Fused, AFreeVoxelThatIsFoundOccupiedTurnsWithinTheCap) {
 
 // --- blocks against a frame ---
 
-constexpr int32_t kRows = 48, kCols = 64;
-constexpr float kVoxelM = 0.02f, kTruncationM = 0.08f;
+constexpr int32_t kFusedRows = 48, kFusedCols = 64;
+constexpr float kFusedVoxelM = 0.02f, kFusedTruncationM = 0.08f;
 constexpr float kCap = 4;
 constexpr int kCarveFrames = 50;
 
 /// A map, and all that is needed to bring frames into it; what the engine does, in plain loops.
 class Mapper {
  public:
-  Mapper() : depth_m(kRows, kCols), mask(kRows, kCols), colour(kRows, kCols), ranges_(kRows, kCols) {
-    for (int32_t r = 0; r < kRows; ++r)
-      for (int32_t c = 0; c < kCols; ++c) {
+  Mapper()
+      : depth_m(kFusedRows, kFusedCols),
+        mask(kFusedRows, kFusedCols),
+        colour(kFusedRows, kFusedCols),
+        ranges_(kFusedRows, kFusedCols) {
+    for (int32_t r = 0; r < kFusedRows; ++r)
+      for (int32_t c = 0; c < kFusedCols; ++c) {
         depth_m.view().at(r, c) = 1.5f;
         colour.view().at(r, c) = {static_cast<uint16_t>(1000 * (r % 40)), static_cast<uint8_t>(4 * c), 140};
       }
@@ -277,7 +281,8 @@ class Mapper {
   void integrate(const Se3& T_cam_map = {}) {
     ranges_.build(depth_m.view(), mask.view());
     const FrameGeometry geometry{
-        ranges_.static_depth(), {56, 56, 31.5f, 23.5f, kCols, kRows}, 0.3f, 2.0f, 1.8f, kTruncationM};
+        ranges_.static_depth(), {56, 56, 31.5f, 23.5f, kFusedCols, kFusedRows}, 0.3f, 2.0f, 1.8f,
+        kFusedTruncationM};
     const VisibleGroupPass visible{map.view(),   geometry,  ranges_.view(), T_cam_map,
                                    {-4, -4, -1}, {8, 8, 6}, free_space};
     std::vector<VisibleBlock> list;
@@ -291,7 +296,7 @@ class Mapper {
       }
     }
     const IntegratePass pass{
-        map.view(), geometry, colour.view().data, T_cam_map, {32767.0f / kTruncationM, kCap},
+        map.view(), geometry, colour.view().data, T_cam_map, {32767.0f / kFusedTruncationM, kCap},
         free_space, frame_++};
     best_loops().integrate(pass, {list.data(), static_cast<uint32_t>(list.size())});
   }
@@ -310,7 +315,7 @@ class Mapper {
     return value;
   }
 
-  AnalyticMap map{12000, kVoxelM, kTruncationM};
+  AnalyticMap map{12000, kFusedVoxelM, kFusedTruncationM};
   TestImage<float> depth_m;
   TestImage<uint8_t> mask;
   TestImage<LumaChroma> colour;
@@ -353,7 +358,7 @@ TEST(IntegratePass, VoxelsUnderMaskedPixelsKeepEveryByte) {
   m.integrate();
   const uint32_t used = m.map.used_blocks();
   std::vector<VoxelBlock> before(m.map.view().blocks.data, m.map.view().blocks.data + used);
-  m.paint(0, kRows, 0, kCols, 1.0f, 255);
+  m.paint(0, kFusedRows, 0, kFusedCols, 1.0f, 255);
   m.integrate();
   EXPECT_EQ(m.map.used_blocks(), used);
   EXPECT_EQ(std::memcmp(before.data(), m.map.view().blocks.data, used * sizeof(VoxelBlock)), 0);
@@ -365,7 +370,7 @@ TEST(IntegratePass, FillsDistanceColourAndFreeSpace) {
   EXPECT_NEAR(m.sdf_m({0, 0, 1.5f}), 0.0f, 1e-3f);
   EXPECT_NEAR(m.sdf_m({0.1f, -0.1f, 1.45f}), 0.05f, 1e-3f);
   EXPECT_NEAR(m.sdf_m({0, 0, 1.55f}), -0.05f, 1e-3f);
-  EXPECT_FLOAT_EQ(m.sdf_m({0, 0, 1.0f}), kTruncationM);
+  EXPECT_FLOAT_EQ(m.sdf_m({0, 0, 1.0f}), kFusedTruncationM);
   EXPECT_TRUE(std::isnan(m.sdf_m({0, 0, 1.7f})));     // hidden
   EXPECT_TRUE(std::isnan(m.sdf_m({0, 0, 0.2f})));     // too near to be seen
   EXPECT_TRUE(std::isnan(m.sdf_m({1.5f, 0, 1.0f})));  // outside of the view
@@ -381,7 +386,7 @@ TEST(IntegratePass, HiddenVoxelsStayAsTheyAre) {
   Mapper m;
   m.integrate();
   const float behind_m = m.sdf_m({0, 0, 1.5f});
-  m.paint(0, kRows, 0, kCols, 1.0f, 0);  // something stands before the wall
+  m.paint(0, kFusedRows, 0, kFusedCols, 1.0f, 0);  // something stands before the wall
   for (int n = 0; n < 20; ++n) m.integrate();
   EXPECT_EQ(m.sdf_m({0, 0, 1.5f}), behind_m);
   EXPECT_EQ(m.map.record({0, 0, 75}).weight, 1);
@@ -389,21 +394,21 @@ TEST(IntegratePass, HiddenVoxelsStayAsTheyAre) {
 
 TEST(IntegratePass, WhatIsSeenThroughIsCarved) {
   Mapper m;
-  m.paint(0, kRows, 0, kCols, 1.0f, 0);
+  m.paint(0, kFusedRows, 0, kFusedCols, 1.0f, 0);
   for (int n = 0; n < 8; ++n) m.integrate();
   EXPECT_NEAR(m.sdf_m({0, 0, 1.0f}), 0.0f, 1e-3f);
-  m.paint(0, kRows, 0, kCols, 1.5f, 0);
+  m.paint(0, kFusedRows, 0, kFusedCols, 1.5f, 0);
   for (int n = 0; n < kCarveFrames; ++n) m.integrate();
-  for (float z_m = 0.5f; z_m < 1.4f; z_m += 0.02f) EXPECT_EQ(m.sdf_m({0, 0, z_m}), kTruncationM) << z_m;
+  for (float z_m = 0.5f; z_m < 1.4f; z_m += 0.02f) EXPECT_EQ(m.sdf_m({0, 0, z_m}), kFusedTruncationM) << z_m;
   EXPECT_NEAR(m.sdf_m({0, 0, 1.5f}), 0.0f, 1e-3f);
 }
 
 TEST(IntegratePass, TooFarAMeasurementMakesFreeSpaceAndNoSurface) {
   Mapper m;
-  m.paint(0, kRows, 0, kCols, 3.0f, 0);  // max_m is 2, the clipping plane 1.8
+  m.paint(0, kFusedRows, 0, kFusedCols, 3.0f, 0);  // max_m is 2, the clipping plane 1.8
   m.integrate();
   EXPECT_GT(m.map.used_blocks(), 100u);
-  EXPECT_FLOAT_EQ(m.sdf_m({0, 0, 1.75f}), kTruncationM);
+  EXPECT_FLOAT_EQ(m.sdf_m({0, 0, 1.75f}), kFusedTruncationM);
   EXPECT_TRUE(std::isnan(m.sdf_m({0, 0, 1.81f})));
   for (uint32_t b = 0; b < m.map.used_blocks(); ++b)
     for (const VoxelSurface& v : m.map.view().blocks[b].surface)
@@ -418,9 +423,9 @@ TEST(IntegratePass, WithoutFreeSpaceOnlyTheBandIsMapped) {
   EXPECT_LT(2 * band.map.used_blocks(), dense.map.used_blocks());
   EXPECT_EQ(band.sdf_m({0, 0, 1.5f}), dense.sdf_m({0, 0, 1.5f}));
   EXPECT_TRUE(std::isnan(band.sdf_m({0, 0, 1.0f})));
-  band.paint(0, kRows, 0, kCols, 1.9f, 0);  // what was in the band is carved all the same
+  band.paint(0, kFusedRows, 0, kFusedCols, 1.9f, 0);  // what was in the band is carved all the same
   for (int n = 0; n < kCarveFrames; ++n) band.integrate();
-  EXPECT_EQ(band.sdf_m({0, 0, 1.5f}), kTruncationM);
+  EXPECT_EQ(band.sdf_m({0, 0, 1.5f}), kFusedTruncationM);
 }
 
 TEST(IntegratePass, ABlockThatIsLongFreeSettlesAndWakesWhenASurfaceComes) {
@@ -438,14 +443,14 @@ TEST(IntegratePass, ABlockThatIsLongFreeSettlesAndWakesWhenASurfaceComes) {
   EXPECT_EQ(settled(), 1);  // as many as the weight cap
   m.integrate();
   EXPECT_EQ(settled(), 1);
-  m.paint(0, kRows, 0, kCols, 1.05f, 0);
+  m.paint(0, kFusedRows, 0, kFusedCols, 1.05f, 0);
   m.integrate();
   EXPECT_EQ(settled(), 0);
-  EXPECT_LT(m.sdf_m({0.04f, 0.04f, 1.05f}), kTruncationM);
-  m.paint(0, kRows, 0, kCols, 1.5f, 0);
+  EXPECT_LT(m.sdf_m({0.04f, 0.04f, 1.05f}), kFusedTruncationM);
+  m.paint(0, kFusedRows, 0, kFusedCols, 1.5f, 0);
   for (int n = 0; n < kCarveFrames; ++n) m.integrate();
   EXPECT_EQ(settled(), 1);
-  EXPECT_EQ(m.sdf_m({0.04f, 0.04f, 1.05f}), kTruncationM);
+  EXPECT_EQ(m.sdf_m({0.04f, 0.04f, 1.05f}), kFusedTruncationM);
 }
 
 /// Blocks around the optical axis with every kind of voxel.
@@ -470,28 +475,28 @@ void fill_at_random(AnalyticMap& map, uint32_t seed) {
 }
 
 TEST(IntegratePass, PlainVoxelsEqualRowsOfEight) {
-  TestImage<float> depth(kRows, kCols);
-  TestImage<LumaChroma> colour(kRows, kCols);
+  TestImage<float> depth(kFusedRows, kFusedCols);
+  TestImage<LumaChroma> colour(kFusedRows, kFusedCols);
   std::mt19937 random(31);
   std::uniform_real_distribution<float> z(0.4f, 2.4f);
   std::uniform_int_distribution<int32_t> luma(0, 65280), byte(0, 255);
   std::bernoulli_distribution hole(0.1);
-  for (int32_t r = 0; r < kRows; ++r)
-    for (int32_t c = 0; c < kCols; ++c) {
+  for (int32_t r = 0; r < kFusedRows; ++r)
+    for (int32_t c = 0; c < kFusedCols; ++c) {
       depth.view().at(r, c) = hole(random) ? 0.0f : z(random);
       colour.view().at(r, c) = {static_cast<uint16_t>(luma(random)), static_cast<uint8_t>(byte(random)),
                                 static_cast<uint8_t>(byte(random))};
     }
   for (const CpuLoops* loops : runnable_loops())
     for (const bool free_space : {true, false}) {
-      AnalyticMap plain(400, kVoxelM, kTruncationM), rows(400, kVoxelM, kTruncationM);
+      AnalyticMap plain(400, kFusedVoxelM, kFusedTruncationM), rows(400, kFusedVoxelM, kFusedTruncationM);
       fill_at_random(plain, 5);
       fill_at_random(rows, 5);
-      const FrameGeometry geometry{depth.view(), {56, 56, 31.5f, 23.5f, kCols, kRows}, 0.3f, 2.0f, 1.8f,
-                                   kTruncationM};
+      const FrameGeometry geometry{
+          depth.view(), {56, 56, 31.5f, 23.5f, kFusedCols, kFusedRows}, 0.3f, 2.0f, 1.8f, kFusedTruncationM};
       const Se3 T_cam_map = exp(Twist{{0.02f, -0.03f, 0.01f}, {0.05f, 0.1f, -0.2f}});
       IntegratePass pass{
-          plain.view(), geometry, colour.view().data, T_cam_map, {32767.0f / kTruncationM, kCap},
+          plain.view(), geometry, colour.view().data, T_cam_map, {32767.0f / kFusedTruncationM, kCap},
           free_space,   41};
       std::vector<VisibleBlock> list;
       for (uint32_t id = 0; id < plain.used_blocks(); ++id)
@@ -501,7 +506,7 @@ TEST(IntegratePass, PlainVoxelsEqualRowsOfEight) {
       loops->integrate(pass, {list.data(), static_cast<uint32_t>(list.size())});
       // A fused multiply-add may move a voxel that projects onto the border of two pixels.
       int32_t different = 0, changed = 0;
-      AnalyticMap untouched(400, kVoxelM, kTruncationM);
+      AnalyticMap untouched(400, kFusedVoxelM, kFusedTruncationM);
       fill_at_random(untouched, 5);
       for (uint32_t id = 0; id < plain.used_blocks(); ++id) {
         EXPECT_EQ(plain.view().settled_free[id], rows.view().settled_free[id]);

@@ -15,31 +15,34 @@ namespace {
 using test::RangePyramid;
 using test::TestImage;
 
-constexpr int32_t kRows = 60, kCols = 80;
-constexpr float kVoxelM = 0.02f, kTruncationM = 0.08f;
+constexpr int32_t kViewRows = 60, kViewCols = 80;
+constexpr float kSideM = 0.02f, kBandM = 0.08f;
 
 /// A random depth image (rectangles at random depth, some without measurement) and a random pose.
 class RandomFrame {
  public:
-  explicit RandomFrame(uint32_t seed) : depth_(kRows, kCols), ranges_(kRows, kCols), random_(seed) {
-    fill({0, kRows}, {0, kCols}, uniform(1.5f, 3.5f));
+  explicit RandomFrame(uint32_t seed)
+      : depth_(kViewRows, kViewCols), ranges_(kViewRows, kViewCols), random_(seed) {
+    fill({0, kViewRows}, {0, kViewCols}, uniform(1.5f, 3.5f));
     for (int n = 0; n < 5; ++n) {
-      const auto r = static_cast<int32_t>(uniform(0, kRows)), c = static_cast<int32_t>(uniform(0, kCols));
-      fill({r, std::min(kRows, r + 20)}, {c, std::min(kCols, c + 25)}, n % 4 ? uniform(0.7f, 3.5f) : 0.0f);
+      const auto r = static_cast<int32_t>(uniform(0, kViewRows)),
+                 c = static_cast<int32_t>(uniform(0, kViewCols));
+      fill({r, std::min(kViewRows, r + 20)}, {c, std::min(kViewCols, c + 25)},
+           n % 4 ? uniform(0.7f, 3.5f) : 0.0f);
     }
     ranges_.build(depth_.view(), {});
     const Vec3 axis = normalized(Vec3{uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)});
     pass.T_cam_map = inverse(exp(Twist{{}, uniform(0, 3) * axis}));
     pass.T_cam_map.translation = {uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)};
     pass.geometry = {
-        ranges_.static_depth(), {70, 70, 39.5f, 29.5f, kCols, kRows}, 0.3f, 2.5f, 3.0f, kTruncationM};
+        ranges_.static_depth(), {70, 70, 39.5f, 29.5f, kViewCols, kViewRows}, 0.3f, 2.5f, 3.0f, kBandM};
     pass.ranges = ranges_.view();
     pass.map = map.view();
     pass.free_space = true;
     enclose();
   }
 
-  AnalyticMap map{64, kVoxelM, kTruncationM};
+  AnalyticMap map{64, kSideM, kBandM};
   VisibleGroupPass pass{};
 
  private:
@@ -54,7 +57,7 @@ class RandomFrame {
   /// A box of groups around all that the camera can see, with room.
   void enclose() {
     const Se3 T_map_cam = inverse(pass.T_cam_map);
-    const float group_m = kVoxelM * kBlockEdge * kGroupEdge, reach_m = 4.0f;
+    const float group_m = kSideM * kBlockEdge * kGroupEdge, reach_m = 4.0f;
     const auto cell = [&](float x) { return static_cast<int32_t>(std::floor(x / group_m)); };
     const Vec3 c = T_map_cam.translation;
     pass.first_group = {cell(c.x - reach_m), cell(c.y - reach_m), cell(c.z - reach_m)};
@@ -96,7 +99,7 @@ TEST(VisibleBlocks, EveryVoxelThatIsSeenLiesInAListedBlockAndFreeBlocksAreFree) 
       for (int32_t bit = 0; bit < kGroupBlocks; ++bit) {
         const bool is_free = view.free >> bit & 1, is_mixed = view.mixed >> bit & 1;
         // Far groups are not looked at voxel by voxel: they are out of reach and must be empty.
-        const Vec3 p_cam = pass.T_cam_map * voxel_position(first_voxel(pass.block_at(g, bit)), kVoxelM);
+        const Vec3 p_cam = pass.T_cam_map * voxel_position(first_voxel(pass.block_at(g, bit)), kSideM);
         if (!is_free && !is_mixed && (p_cam.z < 0.0f || p_cam.z > 3.3f)) continue;
         const Seen seen = look_at_voxels(pass, pass.block_at(g, bit));
         if (is_free) {
@@ -229,8 +232,8 @@ TEST(VisibleBlocks, GroupsComeIntoViewAMarginBeforeTheyAreSeen) {
 
 TEST(VisibleBlocks, NothingIsListedWhenNothingWasMeasured) {
   RandomFrame frame(5);
-  const TestImage<float> nothing(kRows, kCols);
-  RangePyramid ranges(kRows, kCols);
+  const TestImage<float> nothing(kViewRows, kViewCols);
+  RangePyramid ranges(kViewRows, kViewCols);
   ranges.build(nothing.view(), {});
   frame.pass.ranges = ranges.view();
   frame.pass.geometry.static_depth_m = ranges.static_depth();

@@ -10,12 +10,13 @@
 namespace stillmap {
 namespace {
 
-constexpr float kVoxelM = 0.02f, kTruncationM = 0.1f;
+constexpr float kEvidenceVoxelM = 0.02f, kEvidenceTruncationM = 0.1f;
 
 /// A view of the corner, a cell a pixel, compared with its map.
 class EvidenceTest : public testing::Test {
  protected:
-  EvidenceTest() : map(test::corner_map(scene, kVoxelM, kTruncationM)), view(scene, camera, Se3d{}) {
+  EvidenceTest()
+      : map(test::corner_map(scene, kEvidenceVoxelM, kEvidenceTruncationM)), view(scene, camera, Se3d{}) {
     cells.px = 1;
     cells.k = camera;
     cells.depth_m = image(depth, 0.0f);
@@ -30,8 +31,8 @@ class EvidenceTest : public testing::Test {
     pass.track.depth_m = cells.depth_m;
     pass.track.k = camera;
     pass.track.max_m = 5.0f;
-    pass.track.weights = {kTruncationM / static_cast<float>(kSdfMax),
-                          1.0f / kVoxelM,
+    pass.track.weights = {kEvidenceTruncationM / static_cast<float>(kSdfMax),
+                          1.0f / kEvidenceVoxelM,
                           0.025f,
                           0.03f,
                           RobustKernel::huber,
@@ -83,7 +84,7 @@ TEST_F(EvidenceTest, SpaceIsEmptyOnceItWasSeenOftenHereAndAround) {
   look(kRow, kCol);
   EXPECT_EQ(cells.evidence.at(kRow, kCol), kUnknown);  // it was seen once
   const Vec3 p = cells.point(kRow, kCol);
-  const auto nearest = [](float m) { return static_cast<int32_t>(std::lround(m / kVoxelM)); };
+  const auto nearest = [](float m) { return static_cast<int32_t>(std::lround(m / kEvidenceVoxelM)); };
   const Int3 at = {nearest(p.x), nearest(p.y), nearest(p.z)};
   map.record(at).weight = 3;
   look(kRow, kCol);
@@ -133,7 +134,7 @@ TEST_F(EvidenceTest, WhereNothingWasEverSeenNobodyKnows) {
 TEST_F(EvidenceTest, FusedCountsTheMeasurementsOnTheSurfaceNextToThePoint) {
   const Vec3 p =
       unproject(camera, static_cast<float>(kCol), static_cast<float>(kRow), depth[kRow * 80 + kCol]);
-  const auto nearest = [](float m) { return static_cast<int32_t>(std::lround(m / kVoxelM)); };
+  const auto nearest = [](float m) { return static_cast<int32_t>(std::lround(m / kEvidenceVoxelM)); };
   VoxelRecord& record = map.record({nearest(p.x), nearest(p.y), nearest(p.z)});
   record.colour_weight = 17;
   record.weight = 60;  // free space counts here, but is no surface

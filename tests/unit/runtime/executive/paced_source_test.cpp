@@ -10,7 +10,7 @@
 namespace stillmap {
 namespace {
 
-constexpr int64_t kPeriod_ns = 20'000'000;
+constexpr int64_t kPacedPeriod_ns = 20'000'000;
 
 /// Frames at a steady rate; each takes a while to decode.
 class SteadySource final : public FrameSource {
@@ -22,7 +22,7 @@ class SteadySource final : public FrameSource {
     if (next_ >= info_.frames) return Status::end;
     std::this_thread::sleep_for(decode_);
     frame.sequence = static_cast<uint32_t>(next_);
-    frame.depth_stamp.ns = 5'000'000'000 + next_++ * kPeriod_ns;
+    frame.depth_stamp.ns = 5'000'000'000 + next_++ * kPacedPeriod_ns;
     return Status::ok;
   }
   void skip(uint32_t count) override { next_ += count; }
@@ -46,7 +46,7 @@ TEST(PacedSource, AFrameComesWhenItsTimeHasCome) {
     ASSERT_EQ(status, Status::ok);
     const int64_t now_ns = monotonic_ns();
     if (i == 0) first_ns = now_ns;
-    EXPECT_GE(now_ns - first_ns, (memory.frame.sequence) * kPeriod_ns - 1'000'000);  // never early
+    EXPECT_GE(now_ns - first_ns, (memory.frame.sequence) * kPacedPeriod_ns - 1'000'000);  // never early
     EXPECT_LE(memory.frame.captured.ns, now_ns);
   }
   EXPECT_EQ(paced.next(memory.frame, 5), Status::end);
