@@ -22,6 +22,7 @@ Status PacedSource::next(RgbdFrame& frame, int32_t timeout_ms) {
       period_ns_ = period_ns_ > 0 ? std::min(period_ns_, step_ns) : step_ns;
     }
     last_ = frame.depth_stamp;
+    last_sequence_ = frame.sequence;
     waiting_ = true;
   }
   const int64_t due = due_ns(frame.depth_stamp);
@@ -39,7 +40,10 @@ void PacedSource::skip_what_is_late(int64_t now_ns) {
   if (period_ns_ == 0) return;
   const int64_t late_ns = now_ns - (due_ns(last_) + period_ns_);
   if (late_ns < period_ns_) return;
-  const auto count = static_cast<uint32_t>(std::min<int64_t>(late_ns / period_ns_, 1000));
+  constexpr int64_t kMost = 1000;
+  const int64_t left = info().frames >= 0 ? info().frames - 1 - last_sequence_ : kMost;
+  const auto count = static_cast<uint32_t>(
+      std::clamp<int64_t>(late_ns / period_ns_, 0, std::max<int64_t>(std::min(left, kMost), 0)));
   source_.skip(count);
   left_out_ += count;
 }

@@ -32,6 +32,7 @@ class PacedSource final : public FrameSource {
   int64_t start_ns_ = 0;  ///< CLOCK_MONOTONIC, of the first frame
   Stamp first_, last_;
   int64_t period_ns_ = 0;  ///< shortest between two frames; 0: not known yet
+  int64_t last_sequence_ = 0;
   uint32_t left_out_ = 0;
 };
 

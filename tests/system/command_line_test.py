@@ -125,8 +125,6 @@ class Usage(Case):
 
     def test_parts_that_are_not_built_say_so(self):
         for arguments in [["run", "--source", SMALL, "--device", "cuda"],
-                          ["run", "--source", SMALL, "--lcm", "udpm://239.255.76.67:7667?ttl=0"],
-                          ["run", "--source", SMALL, "--realtime"],
                           ["run", "--source", SMALL, "--set", "record.log=true"],
                           ["run", "--source", "xtion"],
                           ["replay", "a.lcm"], ["doctor"],
