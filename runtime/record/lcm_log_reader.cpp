@@ -110,11 +110,13 @@ bool LcmLogReader::find_event(size_t& bytes) {
   if (!lcm_log::get_head(at(0), head)) return false;
   bytes = bytes_of(head);
   const bool whole = have(bytes);
-  const bool followed = have(bytes + kSyncBytes) && lcm_log::is_sync(at(bytes));
-  const size_t looked_at = std::min(bytes, held());
-  if (!followed && !(whole && at_end_ && held() < bytes + kSyncBytes) &&
-      next_head(kHeadBytes, looked_at) < looked_at)
-    return false;  // another one begins before it would end
+  const bool ends_file = whole && !have(bytes + kSyncBytes);
+  const bool followed = whole && !ends_file && lcm_log::is_sync(at(bytes));
+  if (!followed && !ends_file) {
+    have(bytes + kHeadBytes - 1);
+    const size_t end = std::min(bytes + kHeadBytes - 1, held());
+    if (next_head(kHeadBytes, end) < end) return false;  // another one begins before this one would end
+  }
   if (!whole) return false;
   return is_printable({reinterpret_cast<const char*>(at(kHeadBytes)), head.channel_bytes});
 }
