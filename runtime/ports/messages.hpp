@@ -97,7 +97,7 @@ struct FrameMessage {
   uint32_t sequence = 0;
   ImageCoding depth_coding = ImageCoding::none, colour_coding = ImageCoding::none;
   View<const uint8_t> depth, colour;  ///< coded
-  uint32_t crc32c = 0;                ///< of depth, then colour
+  uint32_t crc32c = 0;                ///< checksum_of (runtime/record/frame_coder.hpp)
 };
 
 /// What the odometry said to the pipeline.

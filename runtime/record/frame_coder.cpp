@@ -60,11 +60,21 @@ void from_differences(const uint8_t* from, const ImageView<Rgb8>& colour) {
   }
 }
 
-uint32_t checksum_of(const FrameMessage& message) {
-  return crc32c(message.colour.data, message.colour.size, crc32c(message.depth.data, message.depth.size));
-}
-
 }  // namespace
+
+uint32_t checksum_of(const FrameMessage& m) {
+  const auto of_number = [](int64_t number, uint32_t before) {
+    uint8_t bytes[8];
+    for (int i = 0; i < 8; ++i)
+      bytes[i] = static_cast<uint8_t>(static_cast<uint64_t>(number) >> (56 - 8 * i));
+    return crc32c(bytes, sizeof bytes, before);
+  };
+  uint32_t sum = crc32c(m.colour.data, m.colour.size, crc32c(m.depth.data, m.depth.size));
+  for (const int64_t number : {m.depth_stamp.ns, m.colour_stamp.ns, int64_t{m.sequence},
+                               static_cast<int64_t>(m.depth_coding), static_cast<int64_t>(m.colour_coding)})
+    sum = of_number(number, sum);
+  return sum;
+}
 
 /// One packer an image: its memory fits after the first and stays as it is.
 struct FrameEncoder::Packers {
@@ -173,8 +183,7 @@ Status FrameDecoder::refused(std::string why) {
 }
 
 Status FrameDecoder::decode(const FrameMessage& message, RgbdFrame& frame) {
-  if (checksum_of(message) != message.crc32c)
-    return refused("the images' checksum is wrong: the log is damaged");
+  if (checksum_of(message) != message.crc32c) return refused("the checksum is wrong: the log is damaged");
   if (message.depth_coding != ImageCoding::zstd_depth)
     return refused("depth is in a coding that this program does not know");
   const ImageView<uint16_t>& depth = frame.depth_raw;

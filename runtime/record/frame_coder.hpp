@@ -53,6 +53,9 @@ class FrameEncoder {
   std::vector<uint8_t> plain_, depth_packed_, colour_packed_;
 };
 
+/// What FrameMessage::crc32c has to be.
+uint32_t checksum_of(const FrameMessage& message);
+
 /// @thread one; not the real-time thread
 class FrameDecoder {
  public:

@@ -47,6 +47,11 @@ Result<std::unique_ptr<LogRecorder>> LogRecorder::create(const RecordConfig& rec
   std::vector<uint8_t> coded(session_bytes);
   const uint32_t bytes = codec.encode(session, {coded.data(), static_cast<uint32_t>(coded.size())});
   if (bytes == 0) return Error{dir + ": the session cannot be coded for the event log"};
+  if (most + session_bytes > log_options(record, dir).file_bytes)
+    return Error{"record.log_file_bytes = " + std::to_string(log_options(record, dir).file_bytes) +
+                     ": a frame takes up to " + std::to_string(most + session_bytes) +
+                     " bytes; a file has to hold at least one",
+                 ErrorKind::bad_usage};
   recorder->writer_->begin_files_with(log_channel::kSession, session.utime, {coded.data(), bytes});
   recorder->coded_.resize(most);
   return recorder;

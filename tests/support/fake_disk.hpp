@@ -23,11 +23,7 @@ class FakeDisk final : public LogDisk {
   std::map<std::string, std::string> files() const { return contents(names_, false); }
   /// What is left of them after a power cut, in the worst case.
   std::map<std::string, std::string> after_power_cut() const { return contents(durable_names_, true); }
-  uint64_t bytes() const {
-    uint64_t sum = 0;
-    for (const auto& [name, file] : names_) sum += files_[file].content.size();
-    return sum;
-  }
+  uint64_t bytes() const { return bytes_; }
 
   int list(const std::string& folder, std::vector<Entry>& entries) override {
     for (const auto& [path, file] : names_)
@@ -43,22 +39,25 @@ class FakeDisk final : public LogDisk {
   }
   int append(int file, View<iovec> pieces) override {
     for (const iovec& piece : pieces) {
-      const uint64_t used = bytes(), left = used < room ? room - used : 0;
+      const uint64_t left = bytes_ < room ? room - bytes_ : 0;
       const size_t taken = std::min<uint64_t>(piece.iov_len, left);
+      bytes_ += taken;
       at(file).content.append(static_cast<const char*>(piece.iov_base), taken);
-      most_bytes = std::max(most_bytes, bytes());
+      most_bytes = std::max(most_bytes, bytes_);
       if (taken < piece.iov_len) return ENOSPC;
     }
     return 0;
   }
   int cut(int file, uint64_t bytes) override {
+    bytes_ -= at(file).content.size() - bytes;
     at(file).content.resize(bytes);
+    at(file).synced = std::min<size_t>(at(file).synced, bytes);
     return 0;
   }
   int sync(int file) override {
     if (fail_sync != 0) return fail_sync;
     ++syncs;
-    at(file).synced = at(file).content;
+    at(file).synced = at(file).content.size();
     return 0;
   }
   int close(int) override { return 0; }
@@ -72,7 +71,13 @@ class FakeDisk final : public LogDisk {
   }
   int remove(const char* path) override {
     if (fail_remove != 0) return fail_remove;
-    return names_.erase(path) == 1 ? 0 : ENOENT;
+    const auto it = names_.find(path);
+    if (it == names_.end()) return ENOENT;
+    bytes_ -= files_[it->second].content.size();
+    std::string().swap(files_[it->second].content);  // a day's files do not fit into memory
+    files_[it->second].synced = 0;
+    names_.erase(it);
+    return 0;
   }
   int sync_folder(const char*) override {
     durable_names_ = names_;
@@ -82,18 +87,21 @@ class FakeDisk final : public LogDisk {
 
  private:
   struct File {
-    std::string content, synced;
+    std::string content;
+    size_t synced = 0;
   };
   using Names = std::map<std::string, size_t>;
 
   File& at(int file) { return files_.at(static_cast<size_t>(file)); }
   std::map<std::string, std::string> contents(const Names& names, bool synced) const {
     std::map<std::string, std::string> all;
-    for (const auto& [name, file] : names) all[name] = synced ? files_[file].synced : files_[file].content;
+    for (const auto& [name, file] : names)
+      all[name] = files_[file].content.substr(0, synced ? files_[file].synced : std::string::npos);
     return all;
   }
 
   std::vector<File> files_;
+  uint64_t bytes_ = 0;
   Names names_, durable_names_;
 };
 

@@ -7,7 +7,6 @@
 #include <cstring>
 #include <random>
 
-#include "runtime/core/crc32c.hpp"
 #include "tests/support/contains.hpp"
 #include "tests/support/frame_memory.hpp"
 #include "tests/support/test_image.hpp"
@@ -108,6 +107,10 @@ TEST(FrameCoder, SeesEveryChangedByte) {
     ASSERT_TRUE(contains(decoder.error(), "checksum"));
     colour[i] ^= 1;
   }
+  FrameMessage damaged = message;
+  ++damaged.depth_stamp.ns;
+  FrameMemory back(kCols, kRows);
+  EXPECT_EQ(decoder.decode(damaged, back.frame), Status::bad_data) << "stamps are checked as well";
 }
 
 /// With a right checksum over wrong bytes, as a foreign or hostile program would write them.
@@ -131,7 +134,7 @@ TEST(FrameCoder, NoBytesMakeItCrash) {
       if (round % 3 == 0) c.resize(random() % c.size());
       message.depth = {d.data(), static_cast<uint32_t>(d.size())};
       message.colour = {c.data(), static_cast<uint32_t>(c.size())};
-      message.crc32c = crc32c(c.data(), c.size(), crc32c(d.data(), d.size()));
+      message.crc32c = checksum_of(message);
       FrameMemory back(kCols, kRows);
       refused += decoder.decode(message, back.frame) == Status::bad_data;
     }
