@@ -35,6 +35,7 @@ struct CameraConfig {
 
 struct SourceConfig {
   float wait_s = 0;
+  float stall_s = 1;
   float time_offset_ms = 0;
   float max_pair_ms = 20;
 
@@ -42,6 +43,7 @@ struct SourceConfig {
   static void fields(F&& f) {
     using P = SourceConfig;
     f("wait_s", &P::wait_s, -1, 1e9, "s", "ours", "how long to wait for the source to appear; -1: for ever");
+    f("stall_s", &P::stall_s, 0.05, 1e6, "s", "ours", "live: no frame for so long is the fault camera_stalled");
     f("time_offset_ms", &P::time_offset_ms, -1e4, 1e4, "ms", "ours",
       "added to the colour stamp before pairing");
     f("max_pair_ms", &P::max_pair_ms, 0, 1000, "ms", "ours", "largest distance of the stamps of a pair");
@@ -53,12 +55,15 @@ struct MountConfig {
   /// Body (x forward, y left, z up) from camera: place in metres, unit quaternion x y z w. A level camera
   /// that looks forward.
   std::array<float, 7> T_body_cam = {0, 0, 0, -0.5f, 0.5f, -0.5f, 0.5f};
+  std::array<float, 2> initial_rp_deg = {0, 0};
 
   template <class F>
   static void fields(F&& f) {
     using P = MountConfig;
     f("T_body_cam", &P::T_body_cam, -100, 100, "m and quaternion x y z w", "ours",
       "pose of the camera on the body (x forward, y left, z up)");
+    f("initial_rp_deg", &P::initial_rp_deg, -180, 180, "deg", "ours",
+      "roll and pitch of the body when it starts: the camera cannot tell what is level");
   }
 };
 
@@ -156,13 +161,67 @@ struct LostConfig {
   }
 };
 
+/// What a planner may ask of a running program.
+struct LcmConfig {
+  bool commands = false;
+
+  template <class F>
+  static void fields(F&& f) {
+    using P = LcmConfig;
+    f("commands", &P::commands, 0, 1, "bool", "ours", "obey STILLMAP_COMMAND: anybody on the network can send it");
+  }
+};
+
+/// Threads and deadlines. Priorities, CPU sets and locked memory are for live sources and --realtime; what the
+/// system refuses is said and gone without.
 struct RuntimeConfig {
   int32_t threads = 2;
+  int32_t frame_slots = 6;
+  float period_ms = 0;
+  int32_t capture_priority = 60;
+  int32_t realtime_priority = 50;
+  int32_t publish_priority = 55;
+  std::string realtime_cpus, other_cpus;
+  bool lock_memory = false;
 
   template <class F>
   static void fields(F&& f) {
     using P = RuntimeConfig;
     f("threads", &P::threads, 1, 64, "threads", "ours", "of the CPU engine, the real-time thread included");
+    f("frame_slots", &P::frame_slots, 4, 64, "frames", "ours",
+      "live: frames in memory, from the camera to the disk; beyond them the newest wins");
+    f("period_ms", &P::period_ms, 0, 1e4, "ms", "ours", "live: the deadline of a frame; 0: the camera's period");
+    f("capture_priority", &P::capture_priority, 0, 99, "SCHED_FIFO", "ours", "live; 0: the usual scheduler");
+    f("realtime_priority", &P::realtime_priority, 0, 99, "SCHED_FIFO", "ours",
+      "live, of the thread that takes a frame to its pose; 0: the usual scheduler");
+    f("publish_priority", &P::publish_priority, 0, 99, "SCHED_FIFO", "ours", "live; 0: the usual scheduler");
+    f("realtime_cpus", &P::realtime_cpus, 0, 100, "CPU set", "ours",
+      "live, of the thread that takes a frame to its pose: \"0,2-3\"; empty: any");
+    f("other_cpus", &P::other_cpus, 0, 100, "CPU set", "ours", "live, of capture, publish and record; empty: any");
+    f("lock_memory", &P::lock_memory, 0, 1, "bool", "ours", "live: no page of it is ever on disk");
+  }
+};
+
+/// How a stop ends.
+struct StopConfig {
+  float timeout_s = 5;
+
+  template <class F>
+  static void fields(F&& f) {
+    using P = StopConfig;
+    f("timeout_s", &P::timeout_s, 0, 1e6, "s", "ours",
+      "after a stop signal map and mesh are given up when they take longer");
+  }
+};
+
+/// Numbers for dashboards.
+struct MetricsConfig {
+  int32_t port = 0;
+
+  template <class F>
+  static void fields(F&& f) {
+    using P = MetricsConfig;
+    f("port", &P::port, 0, 65535, "TCP port", "ours", "Prometheus text on 127.0.0.1; 0: off");
   }
 };
 
@@ -190,7 +249,10 @@ struct Config {
   ArchiveConfig archive;
   RecordConfig record;
   LostConfig lost;
+  LcmConfig lcm;
   RuntimeConfig runtime;
+  StopConfig stop;
+  MetricsConfig metrics;
   MemoryConfig memory;
 
   /// Calls `f(section_name, pointer_to_section_member)` for each section, in the order of the files.
@@ -209,7 +271,10 @@ struct Config {
     f("archive", &Config::archive);
     f("record", &Config::record);
     f("lost", &Config::lost);
+    f("lcm", &Config::lcm);
     f("runtime", &Config::runtime);
+    f("stop", &Config::stop);
+    f("metrics", &Config::metrics);
     f("memory", &Config::memory);
   }
 };

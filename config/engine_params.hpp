@@ -24,6 +24,7 @@ inline EngineParams engine_params(const Config& config, CameraModel camera, floa
           config.map,
           config.relocalise,
           config.runtime.threads,
+          nullptr,
           config.archive.dir.empty() ? 0.0f : kFetch_m};
 }
 

@@ -25,9 +25,10 @@ MemoryPlan memory_plan(const Config& config, const CameraModel& camera, const Me
   MemoryPlan plan;
   for (uint32_t i = 0; i < engine.count; ++i) plan.add(engine.item[i].name, engine.item[i].bytes);
   const uint64_t pixels = static_cast<uint64_t>(camera.k.width) * static_cast<uint64_t>(camera.k.height);
-  plan.add("frame slots: depth", kFrameSlots * pixels * sizeof(uint16_t));
-  plan.add("frame slots: colour", kFrameSlots * pixels * sizeof(Rgb8));
-  plan.add("frame slots: true mask", kFrameSlots * pixels * sizeof(uint8_t));
+  const auto slots = static_cast<uint64_t>(config.runtime.frame_slots);
+  plan.add("frame slots: depth", slots * pixels * sizeof(uint16_t));
+  plan.add("frame slots: colour", slots * pixels * sizeof(Rgb8));
+  plan.add("frame slots: masks", 2 * slots * pixels * sizeof(uint8_t));
   plan.budget_bytes = static_cast<uint64_t>(config.memory.budget_mb) * kBytesPerMb;
   return plan;
 }

@@ -25,9 +25,6 @@ struct MemoryPlan {
   bool fits() const { return total_bytes <= budget_bytes; }
 };
 
-/// Frames that the runtime holds: one being filled, one being processed.
-inline constexpr uint64_t kFrameSlots = 2;
-
 /// The engine's pools as `plan_cpu_engine` counts them, the frame slots, and memory.budget_mb (10^6 bytes
 /// each).
 /// @param camera with its size, pixels  @param depth_units_per_m of the source

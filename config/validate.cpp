@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "config/cpu_set.hpp"
 #include "config/fields.hpp"
 
 namespace stillmap {
@@ -128,6 +129,13 @@ void check_record(const RecordConfig& record, Violations& out) {
                  ": must be at least twice record.log_file_bytes = " + float_text(record.log_file_bytes));
 }
 
+void check_runtime(const RuntimeConfig& runtime, Violations& out) {
+  for (const auto& [name, cpus] : {std::pair{"runtime.realtime_cpus", runtime.realtime_cpus},
+                                   std::pair{"runtime.other_cpus", runtime.other_cpus}})
+    out.unless(cpus.empty() || !parse_cpus(cpus).empty(),
+               std::string(name) + " = \"" + cpus + "\": expected a set of CPUs such as \"0,2-3\"");
+}
+
 void check_missing_parts(const Config& config, Violations& out) {
   const char* missing = " is not part of this build; ";
   if (config.depth.invalid == InvalidDepth::complete)
@@ -148,6 +156,7 @@ std::vector<std::string> violations(const Config& config) {
   check_map(config.map, out);
   check_archive(config, out);
   check_record(config.record, out);
+  check_runtime(config.runtime, out);
   check_missing_parts(config, out);
   return out.take();
 }

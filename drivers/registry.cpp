@@ -56,6 +56,11 @@ std::string schemes_of_this_build() {
 
 }  // namespace
 
+bool is_camera(const std::string& source) {
+  const std::string scheme = source.substr(0, source.find(':'));
+  return scheme == "xtion" || scheme == "v4l2";
+}
+
 Result<std::unique_ptr<FrameSource>> open_source(const std::string& source, const SourceOptions& options) {
   const auto refused = [&](const std::string& why) {
     return Error{"source '" + source + "': " + why + "; this build has " + schemes_of_this_build(),

@@ -14,6 +14,9 @@ struct SourceOptions {
   int threads = 2;         ///< 1..64, of a source that computes its frames, the calling thread included
 };
 
+/// The source is a camera: frames come at their own pace.
+bool is_camera(const std::string& source);
+
 /// Makes the source that `source` names: `SCHEME:REST` as on the command line (--source).
 /// @return kind bad_usage: no such scheme, a part that this build lacks, unknown intrinsics, a wrong
 /// description of a

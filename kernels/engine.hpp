@@ -24,6 +24,7 @@ struct EngineParams {
   MapParams map;
   RelocaliseParams relocalise;
   int32_t threads = 2;  ///< CPU engine: 1..64, the calling thread included
+  void (*on_worker_start)() = nullptr;  ///< CPU engine: called once by each worker; may be null
   float fetch_m = 0;    ///< with an archive: so near to the view its groups are wanted back
 };
 
@@ -165,6 +166,9 @@ class Engine {
   virtual MaskResult mask(const Se3& T_world_cam) = 0;
   /// Second registration, masked pixels excluded (paper III-C).
   virtual TrackResult refine(const Se3& T_world_cam_start, const PosePrior& prior = {}) = 0;
+  /// From now on both registrations end at this level at the finest: less work, less exact.
+  /// @param level 0: as configured; cut to the coarsest one
+  virtual void limit_finest_level(int32_t level) = 0;
   /// Allocates on unmasked rays, fuses, carves (paper III-A, III-D).
   virtual IntegrateResult integrate(const Se3& T_world_cam) = 0;
 

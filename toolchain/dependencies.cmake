@@ -10,6 +10,7 @@ if(NOT STILLMAP_PARITY_ONLY)
   pkg_check_modules(spng REQUIRED IMPORTED_TARGET spng)
   pkg_check_modules(turbojpeg REQUIRED IMPORTED_TARGET libturbojpeg)
   pkg_check_modules(zstd REQUIRED IMPORTED_TARGET libzstd)
+  pkg_check_modules(systemd REQUIRED IMPORTED_TARGET libsystemd)
   pkg_check_modules(cairo REQUIRED IMPORTED_TARGET cairo)
   if(STILLMAP_BUILD_TESTS)  # what ours is compared with; the program itself needs none of it
     pkg_check_modules(lcm REQUIRED IMPORTED_TARGET lcm)

@@ -67,7 +67,7 @@ struct Row {
   DurationHistogram total_ms, integrate_ms;
 };
 
-void time_frames(Engine& engine, const Config& config, const FrameSlots& slots, Row& row) {
+void time_frames(Engine& engine, const Config& config, const PreloadedFrames& slots, Row& row) {
   Pipeline pipeline(engine, config);
   for (size_t frame = 0; frame < slots.size() && !stop_requested(); ++frame) {
     const FrameResult result = pipeline.process(slots[frame]->frame());
@@ -114,7 +114,7 @@ int bench_scale(const BenchOptions& o) {
   auto source = open_source(name, source_options(*config));
   if (!source) return fail(source.error(), source.error_kind());
   EngineParams params = engine_params(*config, (*source)->info().camera, (*source)->info().depth_units_per_m);
-  const FrameSlots slots = preload(**source, o.frames);
+  const PreloadedFrames slots = preload(**source, o.frames);
   if (slots.size() < 2) return fail(name + ": fewer than two usable frames", ErrorKind::failed);
 
   uint32_t blocks = 0;

@@ -69,7 +69,7 @@ int bench_steps(const BenchOptions& o) {
   if (!engine)
     return fail("the memory of the engine cannot be had; lower map.pool_blocks", ErrorKind::failed);
 
-  const FrameSlots slots = preload(**source, o.frames);
+  const PreloadedFrames slots = preload(**source, o.frames);
   if (slots.size() < 2) return fail(name + ": fewer than two usable frames", ErrorKind::failed);
   Pipeline pipeline(*engine, *config);
   Histograms times;

@@ -23,6 +23,9 @@ inline constexpr int kExitLost = 4;      ///< tracking was lost and not found ag
 /// Prints `stillmap: MESSAGE` to stderr. @return the exit code of that kind of error
 int fail(const std::string& message, ErrorKind kind);
 
+/// Mesh of a saved map, on one thread. @return the error, or empty
+std::string mesh_of_map(const std::string& map_path, const std::string& mesh_path);
+
 void add_run(CLI::App& app, int& exit_code);
 void add_evaluate(CLI::App& app, int& exit_code);
 void add_bench(CLI::App& app, int& exit_code);

@@ -58,18 +58,6 @@ SourceOptions source_options(const Config& config) {
   return options;
 }
 
-FrameSlot::FrameSlot(const SourceInfo& info) {
-  const int32_t rows = info.camera.k.height, cols = info.camera.k.width;
-  const auto pixels = static_cast<size_t>(rows) * static_cast<size_t>(cols);
-  depth_.resize(pixels);
-  colour_.resize(pixels);
-  frame_.depth_raw = {depth_.data(), rows, cols, cols};
-  frame_.colour = {colour_.data(), rows, cols, cols};
-  if (!info.has_truth_mask) return;
-  truth_mask_.resize(pixels);
-  frame_.truth_mask = {truth_mask_.data(), rows, cols, cols};
-}
-
 namespace {
 
 /// Of map.high_water: between them there is room for what comes while the archive writes.
@@ -95,8 +83,8 @@ MemoryPlan plan_memory(const Config& config, const EngineParams& params) {
   return plan;
 }
 
-FrameSlots preload(FrameSource& source, int32_t count) {
-  FrameSlots slots;
+PreloadedFrames preload(FrameSource& source, int32_t count) {
+  PreloadedFrames slots;
   while (static_cast<int32_t>(slots.size()) < count && !stop_requested()) {
     auto slot = std::make_unique<FrameSlot>(source.info());
     const Status status = source.next(slot->frame(), 1000);

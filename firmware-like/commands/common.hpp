@@ -12,6 +12,7 @@
 #include "config/result.hpp"
 #include "drivers/registry.hpp"
 #include "runtime/archive/block_archive.hpp"
+#include "runtime/executive/frame_slots.hpp"
 #include "runtime/ports/frame_source.hpp"
 
 namespace stillmap {
@@ -32,22 +33,8 @@ MemoryPlan plan_memory(const Config& config, const EngineParams& params);
 /// What a source has to be told: the camera and the stamps where the configuration overrides them.
 SourceOptions source_options(const Config& config);
 
-/// Memory of one frame with the size that a source says.
-class FrameSlot {
- public:
-  explicit FrameSlot(const SourceInfo& info);
-
-  RgbdFrame& frame() { return frame_; }
-
- private:
-  std::vector<uint16_t> depth_;
-  std::vector<Rgb8> colour_;
-  std::vector<uint8_t> truth_mask_;
-  RgbdFrame frame_;
-};
-
-using FrameSlots = std::vector<std::unique_ptr<FrameSlot>>;
+using PreloadedFrames = std::vector<std::unique_ptr<FrameSlot>>;
 /// Reads up to `count` usable frames: decoding and rendering must not disturb a measurement.
-FrameSlots preload(FrameSource& source, int32_t count);
+PreloadedFrames preload(FrameSource& source, int32_t count);
 
 }  // namespace stillmap

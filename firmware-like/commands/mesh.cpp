@@ -37,29 +37,40 @@ EngineParams params_for(const MapFile& file, int32_t threads) {
   return params;
 }
 
-int make_mesh(const MeshOptions& o) {
+struct MeshCounts {
+  uint64_t vertices = 0, triangles = 0;
+};
+
+Result<MeshCounts> make_mesh(const MeshOptions& o) {
   auto file = MapFile::open(o.map);
-  if (!file) return fail(file.error(), file.error_kind());
+  if (!file) return Error{file.error(), file.error_kind()};
   const std::unique_ptr<Engine> engine = make_cpu_engine(params_for(*file, o.threads));
   if (!engine)
-    return fail(fmt::format("{}: its {} blocks do not fit into this machine's memory", o.map,
-                            file->contents().voxel_blocks),
-                ErrorKind::failed);
-  if (const auto loaded = file->load(*engine); !loaded) return fail(loaded.error(), loaded.error_kind());
+    return Error{fmt::format("{}: its {} blocks do not fit into this machine's memory", o.map,
+                             file->contents().voxel_blocks)};
+  if (const auto loaded = file->load(*engine); !loaded) return Error{loaded.error(), loaded.error_kind()};
   PlyWriter writer(o.out);
   const Status status = engine->extract_mesh(writer);
   const bool written = writer.close();
   if (status != Status::ok && writer.error().empty())
-    return fail(fmt::format("{}: the mesh could not be extracted: {}", o.map, to_string(status)),
-                ErrorKind::failed);
-  if (!written) return fail(writer.error(), ErrorKind::failed);
-  std::printf("%s: %llu vertices, %llu triangles\n", o.out.c_str(),
-              static_cast<unsigned long long>(writer.vertex_count()),
-              static_cast<unsigned long long>(writer.triangle_count()));
+    return Error{fmt::format("{}: the mesh could not be extracted: {}", o.map, to_string(status))};
+  if (!written) return Error{writer.error()};
+  return MeshCounts{writer.vertex_count(), writer.triangle_count()};
+}
+
+int print_mesh(const MeshOptions& o) {
+  const auto made = make_mesh(o);
+  if (!made) return fail(made.error(), made.error_kind());
+  fmt::print("{}: {} vertices, {} triangles\n", o.out, made->vertices, made->triangles);
   return kExitDone;
 }
 
 }  // namespace
+
+std::string mesh_of_map(const std::string& map_path, const std::string& mesh_path) {
+  const auto made = make_mesh({map_path, mesh_path, 1});
+  return made ? std::string() : made.error();
+}
 
 void add_mesh(CLI::App& app, int& exit_code) {
   CLI::App* command = app.add_subcommand("mesh", "mesh of a saved map");
@@ -69,7 +80,7 @@ void add_mesh(CLI::App& app, int& exit_code) {
   command->add_option("--threads", options->threads, "of the extraction")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
-  command->callback([options, &exit_code] { exit_code = make_mesh(*options); });
+  command->callback([options, &exit_code] { exit_code = print_mesh(*options); });
 }
 
 }  // namespace stillmap

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <thread>
@@ -13,33 +14,88 @@
 
 #include "config/engine_params.hpp"
 #include "config/memory_plan.hpp"
+#include "drivers/lcm/lcm.hpp"
 #include "drivers/registry.hpp"
 #include "firmware-like/commands/command.hpp"
 #include "firmware-like/commands/common.hpp"
 #include "firmware-like/commands/progress.hpp"
-#include "firmware-like/commands/run_loop.hpp"
 #include "firmware-like/commands/run_options.hpp"
 #include "firmware-like/commands/run_outputs.hpp"
+#include "firmware-like/commands/snapshots.hpp"
 #include "firmware-like/commands/stop_signal.hpp"
+#include "firmware-like/metrics_server.hpp"
+#include "firmware-like/systemd.hpp"
 #include "runtime/archive/block_archive.hpp"
 #include "runtime/archive/map_file.hpp"
+#include "runtime/core/clock.hpp"
 #include "runtime/core/heap_guard.hpp"
+#include "runtime/executive/executive.hpp"
+#include "runtime/executive/paced_source.hpp"
 
 namespace stillmap {
 namespace {
 
-/// Opens the source, waiting source.wait_s for it to appear.
-Result<std::unique_ptr<FrameSource>> open_waiting(const std::string& name, const Config& config) {
-  using Clock = std::chrono::steady_clock;
-  const auto start = Clock::now();
+constexpr const char* kMapFile = "map.smap";
+
+/// What a run tells the network, and hears from it. Empty where --lcm is off.
+struct Lcm {
+  std::unique_ptr<MessageCodec> codec;
+  std::unique_ptr<MessageBus> bus;
+  std::unique_ptr<CommandPort> commands;
+  std::unique_ptr<LcmOdometry> odometry;
+
+  void say_boot(int64_t utc_us) const {
+    if (!bus) return;
+    StatusMessage status;
+    status.utime.us = utc_us;
+    uint8_t bytes[kDatagramBytes];
+    const uint32_t size = codec->encode(status, View<uint8_t>{bytes, kDatagramBytes});
+    bus->publish(kStatusChannel, View<const uint8_t>{bytes, size});  // not sent: there is a next one
+  }
+};
+
+Result<Lcm> open_lcm(const RunOptions& o, const Config& config, const UtcClock& clock, bool live) {
+  Lcm lcm;
+  const std::string url = !o.lcm.empty() ? o.lcm : live ? kLcmDefaultUrl : "off";
+  if (url == "off") return lcm;
+  lcm.codec = make_lcm_codec();
+  auto bus = open_lcm_bus(url);
+  if (!bus) return Error{"--lcm " + bus.error(), bus.error_kind()};
+  lcm.bus = std::move(*bus);
+  if (config.lcm.commands) {
+    auto commands = open_lcm_commands(url);
+    if (!commands) return Error{"--lcm " + commands.error(), commands.error_kind()};
+    lcm.commands = std::move(*commands);
+  }
+  if (config.track.prior == MotionPrior::odometry) {
+    auto odometry = open_lcm_odometry(url, [&clock](Utime t) { return Stamp{clock.to_monotonic_ns(t.us)}; });
+    if (!odometry) return Error{"--lcm " + odometry.error(), odometry.error_kind()};
+    lcm.odometry = std::move(*odometry);
+  }
+  return lcm;
+}
+
+/// Opens the source, waiting source.wait_s for it to appear. Until then the program is in mode boot, and says
+/// so to whoever started it and to the network.
+Result<std::unique_ptr<FrameSource>> open_waiting(const std::string& name, const Config& config,
+                                                  ServiceManager* service, const Lcm& lcm,
+                                                  const UtcClock& clock) {
+  constexpr std::chrono::milliseconds kTry{200};
   const double wait_s = static_cast<double>(config.source.wait_s);
-  while (true) {
+  const int64_t start_ns = monotonic_ns();
+  for (bool waiting = false;; waiting = true) {
     auto source = open_source(name, source_options(config));
-    const double waited_s = std::chrono::duration<double>(Clock::now() - start).count();
-    const bool wait_on = wait_s < 0 || waited_s < wait_s;
+    const int64_t now_ns = monotonic_ns();
+    const bool wait_on = wait_s < 0 || static_cast<double>(now_ns - start_ns) * 1e-9 < wait_s;
     if (source || source.error_kind() != ErrorKind::cannot_open || !wait_on || stop_requested())
       return source;
-    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    if (service && !waiting) {
+      service->ready();
+      service->say("boot: waiting for " + name);
+    }
+    if (service) service->alive();
+    lcm.say_boot(clock.to_utc_us(now_ns));
+    std::this_thread::sleep_for(kTry);
   }
 }
 
@@ -89,7 +145,7 @@ void print_summary(const RunOptions& o, const RunOutputs& outputs, const Pipelin
                static_cast<double>(outputs.map_bytes()) * 1e-6, outputs.map_seconds());
 }
 
-int exit_code_of(const LoopEnd& end, const RunOutputs& outputs, const PipelineCounters& counters) {
+int exit_code_of(const RunEnd& end, const RunOutputs& outputs, const PipelineCounters& counters) {
   if (!end.error.empty()) return fail(end.error, ErrorKind::failed);
   if (outputs.failed()) return fail("not everything could be written, see above", ErrorKind::failed);
   if (counters.frames == 0 && !stop_requested())
@@ -101,23 +157,27 @@ int exit_code_of(const LoopEnd& end, const RunOutputs& outputs, const PipelineCo
   return kExitDone;
 }
 
-}  // namespace
+Result<std::unique_ptr<BlockArchive>> open_archive(const Config& config) {
+  if (config.archive.dir.empty()) return std::unique_ptr<BlockArchive>();
+  return BlockArchive::open(archive_options(config));
+}
 
-int run(const RunOptions& o, FrameObserver* observer) {
-  catch_stop_signals();
-  const auto plan = plan_run(o);
-  if (!plan) return fail(plan.error(), plan.error_kind());
-  const Config& config = plan->config;
+/// A copy of the map that was just saved under a name inside the folder of the run. @return the error, or empty
+std::string copy_map(const RunFolder& folder, const std::string& file) {
+  std::error_code error;
+  const std::string part = folder.path(file) + ".part";
+  std::filesystem::copy_file(folder.path(kMapFile), part, std::filesystem::copy_options::overwrite_existing,
+                             error);
+  if (!error) std::filesystem::rename(part, folder.path(file), error);
+  return error ? folder.path(file) + ": " + error.message() : std::string();
+}
 
-  auto map = open_map(o.map, config);
-  if (!map) return fail(map.error(), map.error_kind());
-
-  auto opened = open_waiting(o.source, config);
-  if (!opened) return stop_requested() ? kExitDone : fail(opened.error(), opened.error_kind());
-  FrameSource& source = **opened;
-  source.skip(o.skip_frames);
-
-  const EngineParams params = engine_params(config, source.info().camera, source.info().depth_units_per_m);
+/// All of a run but its source, which is open.
+int run_with(FrameSource& source, const RunOptions& o, const RunPlan& plan, std::optional<MapFile>& map,
+             Lcm& lcm, UtcClock& clock, ServiceManager* service, FrameObserver* observer) {
+  const Config& config = plan.config;
+  EngineParams params = engine_params(config, source.info().camera, source.info().depth_units_per_m);
+  params.on_worker_start = heap_guard::arm_this_thread;
   const MemoryPlan memory = plan_memory(config, params);
   if (const auto fits = check_budget(memory); !fits) return fail(fits.error(), fits.error_kind());
   const std::unique_ptr<Engine> engine = make_cpu_engine(params);
@@ -126,45 +186,104 @@ int run(const RunOptions& o, FrameObserver* observer) {
         fmt::format("the {} MB of the memory plan cannot be had from this machine; lower map.pool_blocks",
                     memory.total_bytes / 1000000),
         ErrorKind::failed);
-
-  std::unique_ptr<BlockArchive> archive;
-  if (!config.archive.dir.empty()) {
-    auto made = BlockArchive::open(archive_options(config));
-    if (!made) return fail(made.error(), ErrorKind::failed);
-    archive = std::move(*made);
-  }
+  auto archive = open_archive(config);
+  if (!archive) return fail(archive.error(), ErrorKind::failed);
   std::string loaded_text;
-  if (MapFile* const file = map->has_value() ? &**map : nullptr) {
-    const auto loaded = file->load(*engine, archive.get());
+  if (map) {
+    const auto loaded = map->load(*engine, archive->get());
     if (!loaded) return fail("--map " + loaded.error(), loaded.error_kind());
-    loaded_text = map_text(o.map, *file, *loaded);
+    loaded_text = map_text(o.map, *map, *loaded);
   }
 
   SourceInfo info = source.info();
   info.camera = params.camera;
+  const bool live = o.realtime || is_camera(o.source);
+  std::unique_ptr<MetricsServer> metrics;
+  if (config.metrics.port > 0) {
+    auto server = MetricsServer::open(config.metrics.port);
+    if (!server) return fail(server.error(), server.error_kind());
+    metrics = std::move(*server);
+  }
   const int64_t frames = expected_frames(info, o);
-  auto outputs =
+  auto made =
       RunOutputs::create(o.out, config, info, frames, Report("cpu", params.threads, memory.total_bytes));
-  if (!outputs) return fail(outputs.error(), ErrorKind::failed);
-  (*outputs)->event(Stamp{}, "start", fmt::format("{}, cpu engine, {} threads", info.name, params.threads));
+  if (!made) return fail(made.error(), ErrorKind::failed);
+  RunState state;
+  RunOutputs& outputs = **made;
+  outputs.event(Stamp{}, "start", fmt::format("{}, cpu engine, {} threads", info.name, params.threads));
+  if (!loaded_text.empty()) outputs.event(Stamp{}, "map_load", loaded_text);
 
-  if (!loaded_text.empty()) (*outputs)->event(Stamp{}, "map_load", loaded_text);
-  (*outputs)->prepare_map(*engine, archive.get());
-
-  if (observer) observer->begin(source, info);
-  FrameSlot slot(info);
-  Pipeline pipeline(*engine, config, plan->T_map_cam, source.odometry());
-  if (map->has_value())
-    pipeline.start_lost(o.initial_pose.empty() ? (*map)->info().T_map_cam : plan->T_map_cam);
+  OdometryPort* odometry = lcm.odometry ? lcm.odometry.get() : source.odometry();
+  Pipeline pipeline(*engine, config, plan.T_map_cam, odometry);
+  if (map) pipeline.start_lost(o.initial_pose.empty() ? map->info().T_map_cam : plan.T_map_cam);
   Progress progress(frames, o.quiet);
-  const LoopLimits limits = {o.max_frames, static_cast<double>(config.lost.new_map_after_s)};
-  const LoopEnd end =
-      run_loop(source, *engine, pipeline, **outputs, progress, slot.frame(), limits, observer, archive.get());
+  outputs.show_progress(&progress);
+  outputs.watch(&state, archive->get());
+
+  PacedSource paced(source);
+  FrameSource& frames_from = o.realtime && !is_camera(o.source) ? paced : source;
+  ExecutiveParts parts{frames_from, *engine, pipeline, outputs, state, clock};
+  parts.archive = archive->get();
+  std::optional<MapKeeper> keeper;
+  std::optional<Snapshots> snapshots;
+  if (const RunFolder* folder = outputs.folder()) {
+    if (config.record.map || lcm.commands) {
+      keeper.emplace(folder->path(kMapFile), config, *engine, archive->get());
+      parts.map_keeper = &*keeper;
+      parts.keep_map = [folder](const std::string& file) { return copy_map(*folder, file); };
+      parts.make_mesh = [folder](const std::string& file) {
+        return mesh_of_map(folder->path(kMapFile), folder->path(file.empty() ? "mesh.ply" : file));
+      };
+    }
+    if (config.record.snapshots > 0 && !live) {
+      if (const std::string error = folder->make("snapshots"); !error.empty())
+        return fail(error, ErrorKind::failed);
+      snapshots.emplace(folder->path("snapshots"), *engine, info, frames, config.record.snapshots);
+      parts.observers.push_back(&*snapshots);
+    }
+  }
+  if (observer) {
+    observer->begin(source, info);
+    parts.observers.push_back(observer);
+  }
+  parts.codec = lcm.codec.get();
+  parts.bus = lcm.bus.get();
+  parts.commands = lcm.commands.get();
+  parts.service = service;
+  parts.stop_requested = stop_requested;
+  if (metrics) parts.on_status = [&metrics](const StatusMessage& status) { metrics->show(status); };
+
+  Executive executive(parts, config,
+                      {plan.T_map_cam, o.max_frames, live, outputs.folder() && config.record.masks});
+  const RunEnd end = executive.run();
+  progress.finish();
   const double seconds = progress.seconds();
-  (*outputs)->finish(*engine, source, pipeline.counters(), archive.get());
-  if (!o.quiet) print_summary(o, **outputs, pipeline.counters(), seconds);
+  outputs.show_progress(nullptr);
+  if (snapshots) outputs.tell(snapshots->error());
+  outputs.finish(*engine, source, pipeline.counters(),
+                 keeper && config.record.map ? &keeper->saver() : nullptr, archive->get(),
+                 stop_requested() ? static_cast<double>(config.stop.timeout_s) : -1);
+  if (!o.quiet) print_summary(o, outputs, pipeline.counters(), seconds);
   std::fflush(stdout);
-  return exit_code_of(end, **outputs, pipeline.counters());
+  return exit_code_of(end, outputs, pipeline.counters());
+}
+
+}  // namespace
+
+int run(const RunOptions& o, FrameObserver* observer) {
+  catch_stop_signals();
+  const auto plan = plan_run(o);
+  if (!plan) return fail(plan.error(), plan.error_kind());
+  auto map = open_map(o.map, plan->config);
+  if (!map) return fail(map.error(), map.error_kind());
+  UtcClock clock;
+  auto lcm = open_lcm(o, plan->config, clock, o.realtime || is_camera(o.source));
+  if (!lcm) return fail(lcm.error(), lcm.error_kind());
+  const std::unique_ptr<ServiceManager> service = systemd_service();
+  auto source = open_waiting(o.source, plan->config, service.get(), *lcm, clock);
+  if (!source) return stop_requested() ? kExitDone : fail(source.error(), source.error_kind());
+  (*source)->skip(o.skip_frames);
+  return run_with(**source, o, *plan, *map, *lcm, clock, service.get(), observer);
 }
 
 void add_run(CLI::App& app, int& exit_code) {

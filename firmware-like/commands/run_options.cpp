@@ -49,9 +49,6 @@ std::string apply_number(const std::string& flag, const std::string& text, doubl
 std::string part_not_built(const RunOptions& o) {
   if (o.device == "cuda")
     return "--device cuda: this build has no CUDA engine; use --device auto or --device cpu";
-  if (o.lcm != "off") return "--lcm " + o.lcm + ": LCM is not part of this build; use --lcm off";
-  if (o.realtime)
-    return "--realtime: playing at the pace of the stamps is not part of this build; leave the flag out";
   return {};
 }
 
@@ -76,7 +73,8 @@ void declare_run_flags(CLI::App& command, RunOptions& o) {
   command.add_option("--max-frames", o.max_frames, "stop after so many frames (0: all)");
   command.add_option("--skip-frames", o.skip_frames, "pass over the first frames");
   command.add_flag("--realtime", o.realtime, "at the pace of the stamps, newest first");
-  command.add_option("--lcm", o.lcm, "LCM URL or off")->capture_default_str();
+  command.add_option("--lcm", o.lcm,
+                     "LCM URL or off (default: live udpm://239.255.76.67:7667?ttl=0, else off)");
   command.add_option("--initial-pose", o.initial_pose,
                      "X,Y,Z,QX,QY,QZ,QW of the first frame, camera to map; with --map the first guess");
   command.add_option("--set", o.settings, "section.key=value, over the configuration file; may be repeated")

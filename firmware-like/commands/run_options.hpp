@@ -16,7 +16,7 @@ namespace stillmap {
 
 /// The flags of `stillmap run` as they were typed.
 struct RunOptions {
-  std::string source, config, out, map, device = "auto", lcm = "off", camera, initial_pose;
+  std::string source, config, out, map, device = "auto", lcm, camera, initial_pose;
   std::string threads, depth_scale, time_offset_ms;  ///< "": not given
   uint32_t max_frames = 0;                           ///< 0: all
   uint32_t skip_frames = 0;

@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <limits>
 #include <system_error>
 #include <thread>
 #include <utility>
@@ -12,6 +14,7 @@
 #include "config/describe.hpp"
 #include "config/engine_params.hpp"
 #include "runtime/archive/whole_mesh.hpp"
+#include "runtime/core/clock.hpp"
 #include "runtime/core/heap_guard.hpp"
 #include "runtime/image/image_file.hpp"
 #include "runtime/record/output_file.hpp"
@@ -19,6 +22,10 @@
 
 namespace stillmap {
 namespace {
+
+double seconds_now() {
+  return static_cast<double>(monotonic_ns()) * 1e-9;
+}
 
 template <class Writer>
 std::string error_of(const Result<Writer>& result) {
@@ -28,12 +35,7 @@ std::string error_of(const Result<Writer>& result) {
 }  // namespace
 
 RunOutputs::RunOutputs(const Config& config, const SourceInfo& source, int64_t frames, Report report)
-    : record_(config.record), config_(config), source_(source), frames_(frames), report_(std::move(report)) {
-  const Intrinsics& k = source.camera.k;
-  if (record_.snapshots == 0) return;
-  raycast_depth_.resize(static_cast<size_t>(k.width) * static_cast<size_t>(k.height));
-  raycast_colour_.resize(raycast_depth_.size());
-}
+    : record_(config.record), config_(config), source_(source), frames_(frames), report_(std::move(report)) {}
 
 Result<std::unique_ptr<RunOutputs>> RunOutputs::create(const std::string& dir, const Config& config,
                                                        const SourceInfo& source, int64_t frames,
@@ -57,7 +59,6 @@ std::string RunOutputs::open(const std::string& dir) {
   std::vector<std::string> inner;
   if (record_.masks) inner.emplace_back("masks");
   if (record_.masks && source_.has_truth_mask) inner.emplace_back("masks_truth");
-  if (record_.snapshots > 0) inner.emplace_back("snapshots");
   for (const std::string& name : inner)
     if (std::string error = folder->make(name); !error.empty()) return error;
   if (std::string error = write_whole_file(folder->path("config.toml"), to_toml(config_)); !error.empty())
@@ -74,26 +75,72 @@ void RunOutputs::tell(const std::string& error) {
   events_.fault(last_stamp_, "record_failed", error);
 }
 
-void RunOutputs::add(const RgbdFrame& frame, const FrameResult& result, Engine& engine) {
+void RunOutputs::add(const RunItem& item, const RgbdFrame* frame, ImageView<const uint8_t> mask) {
+  if (item.has_frame) add_frame(item, frame, mask);
+  if (item.event.kind != RunEvent::Kind::none) add_event(item.event);
+}
+
+void RunOutputs::add(const Notice& notice) {
+  if (progress_) progress_->finish();
+  if (notice.name == name_of(Fault::bad_frame)) return bad_frame(notice.stamp, notice.text);
+  switch (notice.kind) {
+    case Notice::Kind::info:
+      return events_.info(notice.stamp, notice.name, notice.text);
+    case Notice::Kind::warning:
+      return events_.warning(notice.stamp, notice.name, notice.text);
+    case Notice::Kind::fault:
+      return events_.fault(notice.stamp, notice.name, notice.text);
+  }
+}
+
+void RunOutputs::idle() {
+  if (std::chrono::steady_clock::now() < report_due_) return;
+  rewrite_report();
+  report_due_ += kReportPeriod;
+}
+
+void RunOutputs::add_frame(const RunItem& item, const RgbdFrame* frame, ImageView<const uint8_t> mask) {
+  const FrameResult& result = item.result;
   const double period_s =
       frames_seen_ == 0 ? 0 : static_cast<double>(result.stamp.ns - last_stamp_.ns) * 1e-9;
   last_stamp_ = result.stamp;
+  counters_ = item.counters;
   report_.add(result, period_s);
+  report_.set_map(result.map);
   note_changes(result);
   if (files_) {
     files_->trajectory.write(result.stamp, result.T_map_cam);
     files_->states.write(result);
     files_->timing.write(result);
-    add_truth(frame, result);
-    if (result.status != Status::bad_data) add_images(frame, result, engine);
+    add_truth(item);
+    if (frame && result.status != Status::bad_data) add_masks(*frame, result, mask);
     for (const OutputFile* file :
          {&files_->trajectory.file(), &files_->states.file(), &files_->timing.file()})
       tell(file->error());
     tell(events_.error());
   }
-  save_map_on_the_way(result);
+  if (archive_) note_archive_trouble(item.archive);
   last_ = result;
   ++frames_seen_;
+  if (progress_) progress_->show(result, static_cast<uint32_t>(frames_seen_));
+}
+
+void RunOutputs::add_event(const RunEvent& event) {
+  switch (event.kind) {
+    case RunEvent::Kind::none:
+      return;
+    case RunEvent::Kind::new_map:
+      return note_new_map(event.stamp, fmt::format("lost for {:.1f} s", event.seconds));
+    case RunEvent::Kind::reset:
+      return note_new_map(event.stamp, "reset by command");
+    case RunEvent::Kind::map_save_progress:
+      return events_.info(event.stamp, "map_save",
+                          fmt::format("{} of {} groups of blocks copied", event.done, event.of));
+    case RunEvent::Kind::map_saved:
+      return note_saved_map(event.of, event.done, event.seconds);
+    case RunEvent::Kind::map_save_failed:
+      return tell(event.text);
+  }
 }
 
 void RunOutputs::note_changes(const FrameResult& r) {
@@ -113,57 +160,31 @@ void RunOutputs::note_changes(const FrameResult& r) {
                               r.map.dropped_blocks, r.map.table_full + r.map.pool_empty));
 }
 
-void RunOutputs::add_truth(const RgbdFrame& frame, const FrameResult& result) {
-  if (!frame.truth_T_world_cam) return;
+void RunOutputs::add_truth(const RunItem& item) {
+  if (!item.truth_T_world_cam) return;
+  const FrameResult& result = item.result;
   const bool has_pose = result.status != Status::bad_data && result.state != TrackingState::lost;
-  if (!truth_.anchored() && has_pose) truth_.anchor(result.T_map_cam, *frame.truth_T_world_cam);
+  if (!truth_.anchored() && has_pose) truth_.anchor(result.T_map_cam, *item.truth_T_world_cam);
   if (!truth_.anchored()) return;
   if (!files_->truth) {
     auto writer = TrajectoryWriter::create(files_->folder.path("truth.txt"));
     if (!writer) return tell(writer.error());
     files_->truth.emplace(std::move(*writer));
   }
-  files_->truth->write(result.stamp, truth_.to_map(*frame.truth_T_world_cam));
+  files_->truth->write(result.stamp, truth_.to_map(*item.truth_T_world_cam));
   tell(files_->truth->file().error());
 }
 
-bool RunOutputs::snapshot_due() {
-  // The last frame is one of them, the first is not: its map is the frame itself.
-  if (frames_ <= 0 || snapshots_taken_ >= record_.snapshots) return false;
-  return frames_seen_ + 1 >= (snapshots_taken_ + 1) * frames_ / record_.snapshots;
-}
-
-void RunOutputs::add_images(const RgbdFrame& frame, const FrameResult& result, Engine& engine) {
-  if (!images_) return;
+void RunOutputs::add_masks(const RgbdFrame& frame, const FrameResult& result,
+                           ImageView<const uint8_t> mask) {
+  if (!images_ || !record_.masks) return;
   const std::string name = file_stamp(result.stamp) + ".png";
-  std::string error;
-  if (record_.masks)
-    error = error_of(write_png_grey(files_->folder.path("masks/" + name), engine.mask_image()));
-  if (error.empty() && record_.masks && source_.has_truth_mask)
+  std::string error = error_of(write_png_grey(files_->folder.path("masks/" + name), mask));
+  if (error.empty() && source_.has_truth_mask)
     error = error_of(write_png_grey(files_->folder.path("masks_truth/" + name), frame.truth_mask));
-  if (!error.empty()) {
-    tell(error + "; no further images are written");
-    images_ = false;
-    return;
-  }
-  if (snapshot_due()) add_snapshot(result, engine);
-}
-
-void RunOutputs::add_snapshot(const FrameResult& result, Engine& engine) {
-  const Intrinsics& k = source_.camera.k;
-  const ImageView<Rgb8> colour{raycast_colour_.data(), k.height, k.width, k.width};
-  const std::string path = files_->folder.path("snapshots/" + file_stamp(result.stamp));
-  ++snapshots_taken_;
-  const ImageView<float> depth_m{raycast_depth_.data(), k.height, k.width, k.width};
-  if (engine.raycast(cast<float>(result.T_map_cam), k, depth_m, colour) != Status::ok) return;
-  for (const std::string& error : {error_of(write_png(path + "_colour.png", engine.colour_image())),
-                                   error_of(write_png_grey(path + "_mask.png", engine.mask_image())),
-                                   error_of(write_png(path + "_map.png", colour))}) {
-    if (error.empty()) continue;
-    tell(error + "; no further images are written");
-    images_ = false;
-    return;
-  }
+  if (error.empty()) return;
+  tell(error + "; no further images are written");
+  images_ = false;
 }
 
 void RunOutputs::bad_frame(Stamp stamp, const std::string& why) {
@@ -175,24 +196,65 @@ void RunOutputs::bad_frame(Stamp stamp, const std::string& why) {
     std::fprintf(stderr, "stillmap: further skipped frames go to events.log and report.json only\n");
 }
 
-void RunOutputs::rewrite_report(const PipelineCounters& counters) {
-  report_.set_counters(counters);
-  report_.set_faults(events_.faults());
+void RunOutputs::rewrite_report() {
+  report_.set_counters(counters_);
+  report_.set_heap_allocations(heap_guard::allocations());
+  auto faults = events_.faults();
+  if (state_) {
+    report_.set_dropped(state_->frames_dropped.load(std::memory_order_relaxed));
+    for (uint32_t i = 0; i < kFaults; ++i) {
+      const auto fault = static_cast<Fault>(i);
+      const uint64_t count = state_->faults.entry(fault).count;
+      if (count == 0) continue;
+      uint64_t& entry = faults[std::string(name_of(fault))];
+      entry = std::max(entry, count);
+    }
+  }
+  report_.set_faults(std::move(faults));
   if (files_) tell(write_whole_file(files_->folder.path("report.json"), report_.json()));
 }
 
-void RunOutputs::write_mesh(Engine& engine, BlockArchive* archive) {
-  const auto start = std::chrono::steady_clock::now();
+namespace {
+
+/// Stops an extraction whose time is up.
+class TimedSink final : public MeshSink {
+ public:
+  TimedSink(MeshSink& sink, double deadline_s) : sink_(sink), deadline_s_(deadline_s) {}
+
+  bool begin(uint64_t vertices, uint64_t triangles) override {
+    return in_time() && sink_.begin(vertices, triangles);
+  }
+  bool vertices(View<const Vec3> positions_m, View<const Rgb8> colours) override {
+    return in_time() && sink_.vertices(positions_m, colours);
+  }
+  bool triangles(View<const uint32_t> indices) override { return in_time() && sink_.triangles(indices); }
+
+ private:
+  bool in_time() const { return seconds_now() < deadline_s_; }
+
+  MeshSink& sink_;
+  const double deadline_s_;
+};
+
+}  // namespace
+
+void RunOutputs::write_mesh(Engine& engine, BlockArchive* archive, double deadline_s) {
+  const double start_s = seconds_now();
   PlyWriter writer(files_->folder.path("mesh.ply"));
+  TimedSink sink(writer, deadline_s);
   std::string error;
   if (archive && archive->counters().groups > 0)
     error = extract_whole_mesh(engine, *archive, engine_params(config_, source_.camera, 0),
-                               config_.archive.dir, writer);
-  else if (const Status status = engine.extract_mesh(writer); status != Status::ok)
+                               config_.archive.dir, sink);
+  else if (const Status status = engine.extract_mesh(sink); status != Status::ok)
     error = to_string(status);
-  if (!writer.close()) return tell(writer.error());
+  const bool in_time = seconds_now() < deadline_s;
+  const bool closed = writer.close();
+  if (!in_time)
+    return events_.warning(last_stamp_, "mesh", "not written: it did not fit into stop.timeout_s");
+  if (!closed) return tell(writer.error());
   if (!error.empty()) tell(files_->folder.path("mesh.ply") + ": the mesh could not be extracted: " + error);
-  mesh_seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  mesh_seconds_ = seconds_now() - start_s;
   mesh_triangles_ = writer.triangle_count();
   events_.info(last_stamp_, "mesh",
                fmt::format("{} vertices, {} triangles in {:.2f} s", writer.vertex_count(), mesh_triangles_,
@@ -200,15 +262,14 @@ void RunOutputs::write_mesh(Engine& engine, BlockArchive* archive) {
 }
 
 void RunOutputs::note_archive(const BlockArchive& archive) {
-  note_archive_trouble(archive);
   const ArchiveCounters& c = archive.counters();
+  note_archive_trouble(c);
   events_.info(last_stamp_, "archive",
                fmt::format("{} groups of blocks stored, {} brought back, {} MB in {} files now", c.stored,
                            c.restored, c.bytes / 1000000, c.groups));
 }
 
-void RunOutputs::note_archive_trouble(const BlockArchive& archive) {
-  const ArchiveCounters& c = archive.counters();
+void RunOutputs::note_archive_trouble(const ArchiveCounters& c) {
   // Each time there are twice as many: an archive may be full for weeks.
   if (c.refused > 2 * archive_said_.refused) {
     archive_said_.refused = c.refused;
@@ -218,109 +279,74 @@ void RunOutputs::note_archive_trouble(const BlockArchive& archive) {
   if (c.failed > 2 * archive_said_.failed) {
     archive_said_.failed = c.failed;
     events_.fault(last_stamp_, "archive_failed",
-                  fmt::format("{} so far, the last one: {}", c.failed, archive.last_error()));
+                  fmt::format("{} so far, the last one: {}", c.failed, archive_->last_error()));
   }
 }
 
-void RunOutputs::new_map(Stamp stamp, double lost_s) {
+void RunOutputs::note_new_map(Stamp stamp, const std::string& why) {
   std::string kept;
   if (map_bytes_ > 0 && lost_maps_ < record_.keep_previous) {
     const std::string name = fmt::format("map_lost-{}.smap", ++lost_maps_);
     std::error_code error;
-    std::filesystem::rename(map_saver_->path(), files_->folder.path(name), error);
+    std::filesystem::rename(map_path(), files_->folder.path(name), error);
     if (error) tell(fmt::format("{}: {}", files_->folder.path(name), error.message()));
     kept = error ? "" : "; the old one is " + name;
     map_bytes_ = 0;
   }
   truth_ = {};
-  events_.fault(
-      stamp, "new_map",
-      fmt::format("lost for {:.1f} s: a new map begins where the camera was seen last{}", lost_s, kept));
+  events_.fault(stamp, "new_map",
+                fmt::format("{}: a new map begins where the camera was seen last{}", why, kept));
 }
 
-void RunOutputs::prepare_map(const Engine& engine, const BlockArchive* archive) {
-  if (record_.map && files_)
-    map_saver_ = std::make_unique<MapSaver>(files_->folder.path("map.smap"), engine, archive);
-}
-
-void RunOutputs::save_map_on_the_way(const FrameResult& result) {
-  if (!map_saver_) return;
-  const auto period_ns = static_cast<int64_t>(static_cast<double>(record_.map_every_s) * 1e9);
-  if (!map_save_due_) map_save_due_ = Stamp{result.stamp.ns + period_ns};
-  {
-    const heap_guard::Scope armed;  // live, these run in the real-time loop
-    if (map_save_is_due(result) && map_saver_->begin(MapInfo::of(config_, result.T_map_cam, result.stamp))) {
-      map_saving_ = true;
-      lost_map_wanted_ = false;
-      map_save_due_->ns = result.stamp.ns + period_ns;
-    }
-    map_saver_->step();
-  }
-  note_map_save();
-}
-
-/// Now and then, and when the camera was lost: the map may be given up soon.
-bool RunOutputs::map_save_is_due(const FrameResult& result) {
-  const bool lost = result.state == TrackingState::lost;
-  if (!lost) lost_map_wanted_ = false;
-  if (lost && last_.state != TrackingState::lost) lost_map_wanted_ = config_.lost.new_map_after_s > 0;
-  return lost_map_wanted_ || (!lost && record_.map_every_s > 0 && result.stamp >= *map_save_due_);
-}
-
-/// How far it is, once a second; how it ended.
-void RunOutputs::note_map_save() {
-  if (!map_saving_) return;
-  const SaveProgress progress = map_saver_->progress();
-  const auto now = std::chrono::steady_clock::now();
-  if (progress.saving) {
-    if (now < map_progress_due_) return;
-    map_progress_due_ = now + std::chrono::seconds(1);
-    return events_.info(
-        last_stamp_, "map_save",
-        fmt::format("{} of {} groups of blocks copied", progress.groups_done, progress.groups));
-  }
-  map_saving_ = false;
-  const SaveResult& result = map_saver_->result();
-  tell(result.error);
-  if (!result.error.empty()) return;
-  map_bytes_ = result.bytes;
-  map_seconds_ = result.seconds;
+void RunOutputs::note_saved_map(uint64_t groups, uint64_t bytes, double seconds) {
+  map_bytes_ = bytes;
+  map_seconds_ = seconds;
   events_.info(last_stamp_, "map_save",
-               fmt::format("{}: {} groups of blocks, {:.1f} MB in {:.2f} s", map_saver_->path(),
-                           progress.groups, static_cast<double>(result.bytes) * 1e-6, result.seconds));
+               fmt::format("{}: {} groups of blocks, {:.1f} MB in {:.2f} s", map_path(), groups,
+                           static_cast<double>(bytes) * 1e-6, seconds));
 }
 
 /// A save that is on its way is of an earlier map: it is ended first.
-void RunOutputs::save_map_at_end() {
-  const auto end_save = [&] {
-    for (; map_saver_->progress().saving; note_map_save())
-      if (!map_saver_->step()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    note_map_save();
-  };
-  end_save();
-  map_saving_ = map_saver_->begin(MapInfo::of(config_, last_.T_map_cam, last_.stamp));
-  end_save();
+void RunOutputs::save_map(MapSaver& saver, double deadline_s) {
+  for (const bool last : {false, true}) {
+    if (last && !saver.begin(MapInfo::of(config_, last_.T_map_cam, last_.stamp))) return;
+    while (saver.progress().saving) {
+      if (seconds_now() > deadline_s)
+        return events_.warning(last_stamp_, "map_save",
+                               "not written: it did not fit into stop.timeout_s; an earlier map.smap stays");
+      if (!saver.step()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  }
+  const SaveResult& result = saver.result();
+  if (!result.error.empty()) return tell(result.error);
+  note_saved_map(saver.progress().groups, result.bytes, result.seconds);
 }
 
 void RunOutputs::finish(Engine& engine, const FrameSource& source, const PipelineCounters& counters,
-                        BlockArchive* archive) {
+                        MapSaver* saver, BlockArchive* archive, double timeout_s) {
+  const double deadline_s =
+      timeout_s >= 0 ? seconds_now() + timeout_s : std::numeric_limits<double>::infinity();
+  counters_ = counters;
   report_.set_map(engine.map_health());
   if (archive) note_archive(*archive);
   if (files_) {
-    if (record_.mesh) write_mesh(engine, archive);
-    if (map_saver_ && frames_seen_ > 0) save_map_at_end();
+    close_streams();
+    if (saver && frames_seen_ > 0) save_map(*saver, deadline_s);
+    if (record_.mesh) write_mesh(engine, archive, deadline_s);
     if (const auto cloud = source.truth_cloud(); !cloud.empty() && truth_.anchored())
       tell(write_point_cloud(files_->folder.path("truth_cloud.ply"), in_map_frame(truth_, cloud)));
   }
   events_.info(last_stamp_, "stop",
                fmt::format("{} frames; at most {} blocks with voxels in one view", counters.frames,
                            counters.most_visible_blocks));
-  rewrite_report(counters);
-  if (!files_) return;
+  rewrite_report();
+  if (files_ && !events_.close()) tell(events_.error());
+}
+
+void RunOutputs::close_streams() {
   for (OutputFile* file : {&files_->trajectory.file(), &files_->states.file(), &files_->timing.file()})
     if (!file->close()) tell(file->error());
   if (files_->truth && !files_->truth->file().close()) tell(files_->truth->file().error());
-  if (!events_.close()) tell(events_.error());
 }
 
 uint64_t RunOutputs::fault_count(const std::string& name) const {

@@ -10,11 +10,14 @@
 
 #include "config/config.hpp"
 #include "config/result.hpp"
+#include "firmware-like/commands/progress.hpp"
 #include "kernels/engine.hpp"
 #include "runtime/archive/block_archive.hpp"
 #include "runtime/archive/map_saver.hpp"
-#include "runtime/pipeline/pipeline.hpp"
+#include "runtime/executive/counters.hpp"
+#include "runtime/executive/run_item.hpp"
 #include "runtime/ports/frame_source.hpp"
+#include "runtime/ports/run_recorder.hpp"
 #include "runtime/record/events_log.hpp"
 #include "runtime/record/report.hpp"
 #include "runtime/record/run_folder.hpp"
@@ -25,8 +28,9 @@
 namespace stillmap {
 
 /// What a run leaves in its folder. A file that cannot be written is reported once, the others go on, and
-/// `failed()` says so at the end. Without a folder only counters are kept. @thread one
-class RunOutputs {
+/// `failed()` says so at the end. Without a folder only counters are kept.
+/// @thread record while the threads run, the supervisor's before and after
+class RunOutputs final : public RunRecorder {
  public:
   /// Makes the folder, moves an earlier run away and opens the streams.
   /// @param dir "": no folder  @param source with the camera that the engine uses  @param frames expected,
@@ -34,32 +38,32 @@ class RunOutputs {
   static Result<std::unique_ptr<RunOutputs>> create(const std::string& dir, const Config& config,
                                                     const SourceInfo& source, int64_t frames, Report report);
 
-  /// Where record.map asks for it: takes the memory for saving the map. @param engine outlives this
-  /// @thread boot
-  void prepare_map(const Engine& engine, const BlockArchive* archive);
+  void show_progress(Progress* progress) { progress_ = progress; }
+  /// The report's faults and counters come from there. @param state outlives this
+  void watch(const RunState* state, const BlockArchive* archive) {
+    state_ = state;
+    archive_ = archive;
+  }
 
-  /// After each processed frame, while the engine still holds it.
-  void add(const RgbdFrame& frame, const FrameResult& result, Engine& engine);
-  /// Says at once what the archive refuses or loses. After each frame.
-  void note_archive_trouble(const BlockArchive& archive);
-  /// While the camera is lost: what was mapped is in map.smap, or is not asked for.
-  bool map_may_go() const { return !map_saver_ || (!lost_map_wanted_ && !map_saving_); }
-  /// The map is given up. Its file, where there is one, stays as map_lost-N.smap (record.keep_previous of
-  /// them).
-  void new_map(Stamp stamp, double lost_s);
-  /// A frame that was passed over.
-  void bad_frame(Stamp stamp, const std::string& why);
+  void add(const RunItem& item, const RgbdFrame* frame, ImageView<const uint8_t> mask) override;
+  void add(const Notice& notice) override;
+  /// Rewrites the report once a minute.
+  void idle() override;
   void event(Stamp stamp, const char* name, const std::string& text) { events_.info(stamp, name, text); }
   void fault(Stamp stamp, const char* name, const std::string& text) { events_.fault(stamp, name, text); }
-  void rewrite_report(const PipelineCounters& counters);
-  /// Mesh, true cloud, report; closes the streams.
-  /// @param archive null: there is none
-  void finish(Engine& engine, const FrameSource& source, const PipelineCounters& counters,
-              BlockArchive* archive);
+  /// Closes the streams; then mesh and map (within the time, where it is limited), true cloud, report.
+  /// @param saver null: the map is not saved  @param archive null: there is none  @param timeout_s 0 or more: a
+  /// stop was asked for; negative: no limit
+  void finish(Engine& engine, const FrameSource& source, const PipelineCounters& counters, MapSaver* saver,
+              BlockArchive* archive, double timeout_s);
 
   bool failed() const { return !told_.empty(); }
   uint64_t fault_count(const std::string& name) const;
   const Report& report() const { return report_; }
+  /// The folder, where there is one. It makes what is asked of it inside.
+  const RunFolder* folder() const { return files_ ? &files_->folder : nullptr; }
+  /// Reports an error of somebody else's file, once.
+  void tell(const std::string& error);
   double mesh_seconds() const { return mesh_seconds_; }
   uint64_t mesh_triangles() const { return mesh_triangles_; }
   /// Of map.smap; 0: it was not asked for, or could not be written.
@@ -75,20 +79,25 @@ class RunOutputs {
     std::optional<TrajectoryWriter> truth;
   };
 
+  static constexpr std::chrono::seconds kReportPeriod{60};
+
   RunOutputs(const Config& config, const SourceInfo& source, int64_t frames, Report report);
   std::string open(const std::string& dir);
-  void tell(const std::string& error);
+  void add_frame(const RunItem& item, const RgbdFrame* frame, ImageView<const uint8_t> mask);
+  void add_event(const RunEvent& event);
+  void bad_frame(Stamp stamp, const std::string& why);
   void note_changes(const FrameResult& result);
-  void add_truth(const RgbdFrame& frame, const FrameResult& result);
-  void add_images(const RgbdFrame& frame, const FrameResult& result, Engine& engine);
-  void add_snapshot(const FrameResult& result, Engine& engine);
-  bool snapshot_due();
-  void write_mesh(Engine& engine, BlockArchive* archive);
+  void add_truth(const RunItem& item);
+  void add_masks(const RgbdFrame& frame, const FrameResult& result, ImageView<const uint8_t> mask);
+  void note_new_map(Stamp stamp, const std::string& why);
+  void note_saved_map(uint64_t groups, uint64_t bytes, double seconds);
   void note_archive(const BlockArchive& archive);
-  bool map_save_is_due(const FrameResult& result);
-  void save_map_on_the_way(const FrameResult& result);
-  void note_map_save();
-  void save_map_at_end();
+  void note_archive_trouble(const ArchiveCounters& counters);
+  void close_streams();
+  void write_mesh(Engine& engine, BlockArchive* archive, double deadline_s);
+  void save_map(MapSaver& saver, double deadline_s);
+  void rewrite_report();
+  std::string map_path() const { return files_->folder.path("map.smap"); }
 
   RecordConfig record_;
   Config config_;
@@ -99,22 +108,19 @@ class RunOutputs {
   std::optional<Files> files_;
   TruthFrame truth_;
   std::set<std::string> told_;
-  std::vector<float> raycast_depth_;
-  std::vector<Rgb8> raycast_colour_;
   bool images_ = true;
   int64_t frames_seen_ = 0;
-  int32_t snapshots_taken_ = 0;
   Stamp last_stamp_;
   FrameResult last_;
   double mesh_seconds_ = 0;
   uint64_t mesh_triangles_ = 0;
-  std::unique_ptr<MapSaver> map_saver_;  ///< null: no map is saved
-  std::optional<Stamp> map_save_due_;
-  std::chrono::steady_clock::time_point map_progress_due_;
-  bool lost_map_wanted_ = false;  ///< the camera was lost: what there is is to be saved
+  Progress* progress_ = nullptr;
+  const RunState* state_ = nullptr;
+  const BlockArchive* archive_ = nullptr;
+  PipelineCounters counters_;
+  std::chrono::steady_clock::time_point report_due_ = std::chrono::steady_clock::now() + kReportPeriod;
   int32_t lost_maps_ = 0;
   ArchiveCounters archive_said_;  ///< in the last event
-  bool map_saving_ = false;       ///< a save began whose end was not noted yet
   uint64_t map_bytes_ = 0;
   double map_seconds_ = 0;
 };

@@ -9,7 +9,6 @@
 #include <cstring>
 #include <utility>
 
-#include "runtime/core/heap_guard.hpp"
 
 namespace stillmap {
 namespace {
@@ -20,7 +19,6 @@ constexpr uint32_t kKeysAtOnce = 64;     ///< that the thread reads from the arc
 
 /// Nobody waits for a save: whoever else wants the processor goes first, and it may allocate.
 void step_back() {
-  heap_guard::exempt_this_thread();
   constexpr int kNice = 10;
   ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNice);
 }

@@ -1,11 +1,12 @@
 #include "runtime/core/heap_guard.hpp"
 
 #include <atomic>
+#include <cerrno>
 #include <cstddef>
 #include <cstdlib>
-#include <new>
+#include <cstring>
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(__GLIBC__)
 #define STILLMAP_HEAP_GUARD 0
 #elif defined(__has_feature)
 #if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
@@ -16,31 +17,61 @@
 #define STILLMAP_HEAP_GUARD 1
 #endif
 
+#if STILLMAP_HEAP_GUARD
+#include <execinfo.h>
+#include <unistd.h>
+#endif
+
 namespace stillmap::heap_guard {
 namespace {
 
-// Relaxed is enough: arm and disarm stand around calls that synchronise with the workers by themselves.
-std::atomic<bool> g_armed{false};
 std::atomic<uint64_t> g_allocations{0};
-thread_local bool t_exempt = false;
+std::atomic<bool> g_fatal{false};
+thread_local uint32_t t_armed = 0;
+
+#if STILLMAP_HEAP_GUARD
+constexpr int kMostFrames = 64;
+
+/// Without the heap: backtrace was called once before, so that its library is loaded.
+[[noreturn]] void print_stack_and_end() {
+  t_armed = 0;
+  static constexpr char kText[] = "stillmap: a real-time thread used the heap, from\n";
+  [[maybe_unused]] const auto written = write(STDERR_FILENO, kText, sizeof(kText) - 1);
+  void* frames[kMostFrames];
+  backtrace_symbols_fd(frames, backtrace(frames, kMostFrames), STDERR_FILENO);
+  std::abort();
+}
+
+void note() {
+  if (t_armed == 0) return;
+  g_allocations.fetch_add(1, std::memory_order_relaxed);
+  if (g_fatal.load(std::memory_order_relaxed)) print_stack_and_end();
+}
+
+[[maybe_unused]] const bool g_asked_to_be_fatal = [] {
+  const char* const value = std::getenv("STILLMAP_HEAP_FATAL");
+  if (value != nullptr && std::strcmp(value, "1") == 0) make_fatal();
+  return true;
+}();
+#endif
 
 }  // namespace
 
-void arm() {
-  g_armed.store(true, std::memory_order_relaxed);
+void arm_this_thread() {
+  ++t_armed;
 }
-void disarm() {
-  g_armed.store(false, std::memory_order_relaxed);
+void disarm_this_thread() {
+  --t_armed;
 }
 uint64_t allocations() {
   return g_allocations.load(std::memory_order_relaxed);
 }
-void note() {
-  if (g_armed.load(std::memory_order_relaxed) && !t_exempt)
-    g_allocations.fetch_add(1, std::memory_order_relaxed);
-}
-void exempt_this_thread() {
-  t_exempt = true;
+void make_fatal() {
+#if STILLMAP_HEAP_GUARD
+  void* frame[1];
+  backtrace(frame, 1);
+#endif
+  g_fatal.store(true, std::memory_order_relaxed);
 }
 bool counts() {
   return STILLMAP_HEAP_GUARD != 0;
@@ -50,86 +81,45 @@ bool counts() {
 
 #if STILLMAP_HEAP_GUARD
 
-namespace {
+// operator new and delete of the standard library end here as well.
+extern "C" {
 
-void* allocate(std::size_t bytes) {
+void* __libc_malloc(size_t);
+void* __libc_calloc(size_t, size_t);
+void* __libc_realloc(void*, size_t);
+void* __libc_memalign(size_t, size_t);
+void __libc_free(void*);
+
+void* malloc(size_t bytes) noexcept {
   stillmap::heap_guard::note();
-  return std::malloc(bytes == 0 ? 1 : bytes);
+  return __libc_malloc(bytes);
 }
-
-void* allocate_aligned(std::size_t bytes, std::align_val_t alignment) {
+void* calloc(size_t count, size_t bytes) noexcept {
   stillmap::heap_guard::note();
-  const auto a = static_cast<std::size_t>(alignment);
-  return std::aligned_alloc(a, (bytes + a - 1) / a * a);  // the size must be a multiple of the alignment
+  return __libc_calloc(count, bytes);
 }
-
-void* or_throw(void* memory) {
-  if (memory == nullptr) throw std::bad_alloc();
-  return memory;
+void* realloc(void* memory, size_t bytes) noexcept {
+  stillmap::heap_guard::note();
+  return __libc_realloc(memory, bytes);
 }
-
-}  // namespace
-
-// All forms that the standard names end in malloc and free, so that any pair of them fits together.
-void* operator new(std::size_t n) {
-  return or_throw(allocate(n));
+void* aligned_alloc(size_t alignment, size_t bytes) noexcept {
+  stillmap::heap_guard::note();
+  return __libc_memalign(alignment, bytes);
 }
-void* operator new[](std::size_t n) {
-  return or_throw(allocate(n));
+void* memalign(size_t alignment, size_t bytes) noexcept {
+  stillmap::heap_guard::note();
+  return __libc_memalign(alignment, bytes);
 }
-void* operator new(std::size_t n, const std::nothrow_t&) noexcept {
-  return allocate(n);
+int posix_memalign(void** memory, size_t alignment, size_t bytes) noexcept {
+  stillmap::heap_guard::note();
+  *memory = __libc_memalign(alignment, bytes);
+  return *memory == nullptr ? ENOMEM : 0;
 }
-void* operator new[](std::size_t n, const std::nothrow_t&) noexcept {
-  return allocate(n);
+void free(void* memory) noexcept {
+  if (memory == nullptr) return;
+  stillmap::heap_guard::note();
+  __libc_free(memory);
 }
-void* operator new(std::size_t n, std::align_val_t a) {
-  return or_throw(allocate_aligned(n, a));
-}
-void* operator new[](std::size_t n, std::align_val_t a) {
-  return or_throw(allocate_aligned(n, a));
-}
-void* operator new(std::size_t n, std::align_val_t a, const std::nothrow_t&) noexcept {
-  return allocate_aligned(n, a);
-}
-void* operator new[](std::size_t n, std::align_val_t a, const std::nothrow_t&) noexcept {
-  return allocate_aligned(n, a);
-}
-void operator delete(void* p) noexcept {
-  std::free(p);
-}
-void operator delete[](void* p) noexcept {
-  std::free(p);
-}
-void operator delete(void* p, std::size_t) noexcept {
-  std::free(p);
-}
-void operator delete[](void* p, std::size_t) noexcept {
-  std::free(p);
-}
-void operator delete(void* p, const std::nothrow_t&) noexcept {
-  std::free(p);
-}
-void operator delete[](void* p, const std::nothrow_t&) noexcept {
-  std::free(p);
-}
-void operator delete(void* p, std::align_val_t) noexcept {
-  std::free(p);
-}
-void operator delete[](void* p, std::align_val_t) noexcept {
-  std::free(p);
-}
-void operator delete(void* p, std::size_t, std::align_val_t) noexcept {
-  std::free(p);
-}
-void operator delete[](void* p, std::size_t, std::align_val_t) noexcept {
-  std::free(p);
-}
-void operator delete(void* p, std::align_val_t, const std::nothrow_t&) noexcept {
-  std::free(p);
-}
-void operator delete[](void* p, std::align_val_t, const std::nothrow_t&) noexcept {
-  std::free(p);
 }
 
 #endif

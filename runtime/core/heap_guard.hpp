@@ -4,29 +4,27 @@
 
 namespace stillmap::heap_guard {
 
-// A program that links this file has its global operator new replaced by one that counts while the guard is
-// armed, whichever thread calls. It proves that the real-time loop and the workers of the engine do not
-// allocate.
+// A program that links this file has the allocator of the C library replaced by one that looks, before it does
+// what it always did, whether the calling thread is armed. C++ and every library go through it. It proves that
+// the real-time threads and the workers of the engine leave the heap alone.
 
-/// Starts counting. @thread any
-void arm();
-/// Stops counting. @thread any
-void disarm();
-/// Allocations seen while armed, since the program started. @thread any
+/// From now on what the calling thread does with the heap is counted. May be nested.
+void arm_this_thread();
+void disarm_this_thread();
+/// Heap calls of armed threads since the program started, `free` included. @thread any
 uint64_t allocations();
-/// Counts one allocation when armed; for hooks of other allocators (tests hook malloc). @thread any
-void note();
-/// From now on the calling thread may allocate: it is none that real time waits for, or that it runs on.
-void exempt_this_thread();
-/// False under AddressSanitizer and ThreadSanitizer, whose own operator new stays in place: nothing is
-/// counted there.
+/// From now on the first heap call of an armed thread prints where it came from and ends the program. The
+/// variable STILLMAP_HEAP_FATAL=1 does the same. @thread boot
+void make_fatal();
+/// False under AddressSanitizer and ThreadSanitizer, whose own allocator stays in place, and without glibc:
+/// nothing is counted there.
 bool counts();
 
-/// Armed for a scope.
+/// The calling thread, armed for a scope.
 class Scope {
  public:
-  Scope() { arm(); }
-  ~Scope() { disarm(); }
+  Scope() { arm_this_thread(); }
+  ~Scope() { disarm_this_thread(); }
   Scope(const Scope&) = delete;
   Scope& operator=(const Scope&) = delete;
 };

@@ -66,10 +66,14 @@ void Pipeline::start_new_map() {
   ++counters_.new_maps;
 }
 
-FrameResult Pipeline::process(const RgbdFrame& frame) {
+FrameResult Pipeline::process(const RgbdFrame& frame, const FrameWork& work, PoseListener* listener) {
   StopWatch total, watch;
+  work_ = work;
+  listener_ = listener;
+  engine_.limit_finest_level(work.finest_level);
   FrameResult result;
   result.stamp = frame.depth_stamp;
+  result.captured = frame.captured;
   result.sequence = frame.sequence;
   result.T_map_cam = T_map_cam_;
   lost_ = lost_ || blind_too_long(frame.depth_stamp);
@@ -87,6 +91,7 @@ FrameResult Pipeline::process(const RgbdFrame& frame) {
     if (result.state == TrackingState::good) relocaliser_.remember(result.T_map_cam);
   } else if (!lost_) {
     result = go_on_blind(result);
+    announce(result);
   }
   result.map = engine_.map_health();
   result.ms.total_ms = total.total_ms();
@@ -94,17 +99,23 @@ FrameResult Pipeline::process(const RgbdFrame& frame) {
   return result;
 }
 
-void Pipeline::integrate(const Se3& T_map_cam) {
-  const IntegrateResult result = engine_.integrate(T_map_cam);
-  counters_.most_visible_blocks = std::max(counters_.most_visible_blocks, result.visible_voxel_blocks);
+void Pipeline::announce(const FrameResult& result) {
+  if (listener_ != nullptr && result.state != TrackingState::lost) listener_->pose_known(result);
+}
+
+void Pipeline::integrate(const Se3& T_map_cam, FrameResult& result) {
+  const IntegrateResult integrated = engine_.integrate(T_map_cam);
+  counters_.most_visible_blocks = std::max(counters_.most_visible_blocks, integrated.visible_voxel_blocks);
+  result.integrated = true;
 }
 
 /// The first frame is the map: it is taken as static.
 FrameResult Pipeline::start_map(FrameResult result) {
   StopWatch watch;
-  integrate(cast<float>(result.T_map_cam));
   result.p_good = 1.0f;
   result.inlier_ratio = 1.0f;
+  announce(result);
+  integrate(cast<float>(result.T_map_cam), result);
   result.ms.integrate_ms = watch.lap_ms();
   have_map_ = true;
   return result;
@@ -148,7 +159,9 @@ FrameResult Pipeline::track_and_map(FrameResult result) {
     std::copy_n(refined.covariance, 21, result.covariance);
     result.T_map_cam = cast<double>(refined.T_world_cam);
   }
-  if (result.state == TrackingState::good) integrate(refined.T_world_cam);  // a poor pose freezes the map
+  announce(result);
+  // A poor pose freezes the map.
+  if (result.state == TrackingState::good && work_.integrate) integrate(refined.T_world_cam, result);
   result.ms.integrate_ms = watch.lap_ms();
   return result;
 }

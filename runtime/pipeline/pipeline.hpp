@@ -19,9 +19,16 @@ struct StageTimes {
   float prepare_ms = 0, track_ms = 0, mask_ms = 0, refine_ms = 0, integrate_ms = 0, total_ms = 0;
 };
 
-/// What is known after a frame. Plain data: it goes through queues later.
+/// What is done to a frame when there is no time for all of it.
+struct FrameWork {
+  bool integrate = true;     ///< false: tracked, but not mapped
+  int32_t finest_level = 0;  ///< of both registrations; 0: as configured
+};
+
+/// What is known after a frame. Plain data: it goes through queues.
 struct FrameResult {
-  Stamp stamp;  ///< depth capture
+  Stamp stamp;     ///< depth capture, of the source's clock
+  Stamp captured;  ///< the same as CLOCK_MONOTONIC
   uint32_t sequence = 0;
   Status status =
       Status::ok;  ///< bad_data: frame not used (too few valid pixels); pose predicted, map unchanged
@@ -29,10 +36,20 @@ struct FrameResult {
   float p_good = 0;  ///< probability that the pose is good, 0..1
   float inlier_ratio = 0;
   float masked_fraction = 0;  ///< masked pixels over all pixels
+  bool integrated = false;    ///< the map was worked on
   Se3d T_map_cam;             ///< predicted pose while lost
   float covariance[21] = {};  ///< upper triangle, x y z rx ry rz, left perturbation
   StageTimes ms;
   MapHealth map;
+};
+
+/// Waits for poses: gets each as soon as it is known, before the map is worked on.
+/// @thread real-time; neither waits nor allocates
+class PoseListener {
+ public:
+  virtual ~PoseListener() = default;
+  /// @param result state, pose, covariance and the times so far; not yet what the map makes of the frame
+  virtual void pose_known(const FrameResult& result) = 0;
 };
 
 /// Counters over the run.
@@ -58,7 +75,8 @@ class Pipeline {
   /// @param T_map_cam_guess tried first  @thread boot                          test: pipeline_test
   void start_lost(const Se3d& T_map_cam_guess);
 
-  FrameResult process(const RgbdFrame& frame);
+  /// @param listener hears of the pose early; may be null
+  FrameResult process(const RgbdFrame& frame, const FrameWork& work = {}, PoseListener* listener = nullptr);
 
   /// Seconds by the frames' stamps since the camera was found to be lost; 0: it is not.
   double lost_s() const {
@@ -78,7 +96,8 @@ class Pipeline {
   const PipelineCounters& counters() const { return counters_; }
 
  private:
-  void integrate(const Se3& T_map_cam);
+  void announce(const FrameResult& result);
+  void integrate(const Se3& T_map_cam, FrameResult& result);
   FrameResult start_map(FrameResult result);
   FrameResult track_and_map(FrameResult result);
   TrackResult first_registration(const PosePrior& prior);
@@ -92,6 +111,8 @@ class Pipeline {
   Config config_;
   Relocaliser relocaliser_;
   PipelineCounters counters_;
+  FrameWork work_;                    ///< of this frame
+  PoseListener* listener_ = nullptr;  ///< of this frame
   MotionPredictor predictor_;
   Se3d T_map_cam_;               ///< last pose
   float explained_ = 0;          ///< share of the valid pixels on the map, last first registration

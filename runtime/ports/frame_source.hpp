@@ -30,6 +30,7 @@ inline constexpr uint8_t kPutDown = 1;  ///< stands still, but for less than a s
 struct RgbdFrame {
   Stamp depth_stamp;  ///< capture of the depth image
   Stamp colour_stamp;
+  Stamp captured;  ///< the depth image's, as CLOCK_MONOTONIC; 0: a recording that is read as fast as it goes
   uint32_t sequence = 0;          ///< index in the source, skipped and bad frames counted
   ImageView<uint16_t> depth_raw;  ///< 0 and 65535: invalid
   ImageView<Rgb8> colour;

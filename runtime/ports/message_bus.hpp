@@ -4,6 +4,10 @@
 
 namespace stillmap {
 
+inline constexpr char kPoseChannel[] = "STILLMAP_POSE", kStatusChannel[] = "STILLMAP_STATUS",
+                      kRangeChannel[] = "STILLMAP_RANGE", kCommandChannel[] = "STILLMAP_COMMAND",
+                      kOdometryChannel[] = "ODOMETRY";
+
 /// Where encoded messages go: a network. Drivers implement it.
 class MessageBus {
  public:
@@ -22,7 +26,8 @@ class CommandPort {
 
   /// @return ok; timeout: there is none.  @thread supervisor; neither waits nor allocates
   virtual Status next(CommandMessage& command) = 0;
-  /// Messages on our channels that are none of ours or out of range, since the start.
+  /// Messages on the channel that are no commands, or came while too many others waited, since the start.
+  /// @thread any
   virtual uint32_t refused() const = 0;
 };
 

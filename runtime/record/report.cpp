@@ -56,7 +56,7 @@ std::string Report::json() const {
                        {"device", device_},
                        {"threads", threads_},
                        {"frames", counters_.frames},
-                       {"dropped", 0},
+                       {"dropped", dropped_},
                        {"lost_frames", counters_.lost_frames},
                        {"relocalised", counters_.relocalised},
                        {"ms",

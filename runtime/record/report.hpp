@@ -19,6 +19,8 @@ class Report {
   void add(const FrameResult& result, double period_s);
   void set_map(const MapHealth& map) { map_ = map; }
   void set_counters(const PipelineCounters& counters) { counters_ = counters; }
+  /// Frames that nobody looked at since a newer one was there.
+  void set_dropped(uint64_t count) { dropped_ = count; }
   void set_heap_allocations(uint64_t count) { heap_allocations_ = count; }
   void set_faults(std::map<std::string, uint64_t, std::less<>> faults) { faults_ = std::move(faults); }
 
@@ -33,7 +35,7 @@ class Report {
   std::string device_;
   int32_t threads_;
   uint64_t planned_bytes_;
-  uint64_t heap_allocations_ = 0, deadline_misses_ = 0, measured_frames_ = 0;
+  uint64_t dropped_ = 0, heap_allocations_ = 0, deadline_misses_ = 0, measured_frames_ = 0;
   double masked_sum_ = 0;
   MapHealth map_;
   PipelineCounters counters_;

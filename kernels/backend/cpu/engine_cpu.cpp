@@ -186,7 +186,7 @@ struct CpuMemory {
 class CpuEngine final : public Engine {
  public:
   CpuEngine(const EngineParams& params, const CpuLoops& loops, uint64_t bytes)
-      : params_(params), arena_(bytes), loops_(loops), pool_(params.threads) {
+      : params_(params), arena_(bytes), loops_(loops), pool_(params.threads, params.on_worker_start) {
     if (arena_.failed()) return;
     memory_.carve(arena_, params_);
     memory_.map.clear();
@@ -198,7 +198,10 @@ class CpuEngine final : public Engine {
   TrackResult track(const Se3& T_world_cam_start, const PosePrior& prior) override;
   MaskResult mask(const Se3& T_world_cam) override;
   TrackResult refine(const Se3& T_world_cam_start, const PosePrior& prior) override {
-    return register_to_map(T_world_cam_start, memory_.trust, {params_.track.levels - 1, 0}, prior);
+    return register_to_map(T_world_cam_start, memory_.trust, {params_.track.levels - 1, finest_level_}, prior);
+  }
+  void limit_finest_level(int32_t level) override {
+    finest_level_ = std::clamp(level, 0, params_.track.levels - 1);
   }
   IntegrateResult integrate(const Se3& T_world_cam) override;
   void remember_place(const Se3& T_map_cam) override {
@@ -312,6 +315,7 @@ class CpuEngine final : public Engine {
   const CpuLoops& loops_;
   ThreadPool pool_;
   int32_t frames_ = 0;          ///< integrated, modulo 2^16
+  int32_t finest_level_ = 0;    ///< at the finest, of both registrations
   VisibleGroupPass last_view_;  ///< of the last integrated frame, or where a lost camera was looked for
   uint32_t groups_looked_at_ = 0;
   float usual_ = 1.0f;
@@ -390,7 +394,7 @@ void set_kernel(const EngineParams& params, int32_t step, TrackWeights& weights)
 
 TrackResult CpuEngine::track(const Se3& T_start, const PosePrior& prior) {
   const LevelRange levels = {params_.track.levels - 1,
-                             std::min(params_.track.first_finest_level, params_.track.levels - 1)};
+                             std::min(std::max(params_.track.first_finest_level, finest_level_), params_.track.levels - 1)};
   if (!by_parts()) return register_to_map(T_start, {}, levels, prior);
   if (params_.mask.warp)
     carry_mask(memory_.before.depth_m, memory_.before.dynamic, inverse(T_start) * T_before_, memory_.cells);

@@ -4,9 +4,13 @@
 
 namespace stillmap {
 
-ThreadPool::ThreadPool(int32_t threads) {
+ThreadPool::ThreadPool(int32_t threads, void (*on_start)()) {
   constexpr int32_t kMost = 64;
-  for (int32_t i = 1; i < std::min(threads, kMost); ++i) workers_.emplace_back([this] { worker_loop(); });
+  for (int32_t i = 1; i < std::min(threads, kMost); ++i)
+    workers_.emplace_back([this, on_start] {
+      if (on_start != nullptr) on_start();
+      worker_loop();
+    });
 }
 
 ThreadPool::~ThreadPool() {

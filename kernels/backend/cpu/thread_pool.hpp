@@ -11,8 +11,9 @@ namespace stillmap {
 /// which thread does which index varies, but never what an index does: results must not depend on the thread.
 class ThreadPool {
  public:
-  /// @param threads 1..64, the caller included; cut to that.  @thread boot
-  explicit ThreadPool(int32_t threads);
+  /// @param threads 1..64, the caller included; cut to that
+  /// @param on_start called once by each worker; may be null.  @thread boot
+  explicit ThreadPool(int32_t threads, void (*on_start)() = nullptr);
   ~ThreadPool();
   ThreadPool(const ThreadPool&) = delete;
   ThreadPool& operator=(const ThreadPool&) = delete;

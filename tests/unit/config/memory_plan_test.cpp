@@ -27,9 +27,9 @@ MemoryItems items() {
 
 const CameraModel kVga = {{585, 585, 320, 240, 640, 480}, {}};
 
-TEST(MemoryPlan, AddsTwoFramesOfDepthColourAndMask) {
+TEST(MemoryPlan, AddsTheFramesWithDepthColourAndMasks) {
   const MemoryPlan plan = memory_plan(Config{}, kVga, items());
-  const uint64_t frames = 2 * 640 * 480 * (2 + 3 + 1);
+  const uint64_t frames = 6 * 640 * 480 * (2 + 3 + 1 + 1);  // runtime.frame_slots
   EXPECT_EQ(plan.total_bytes, items().total_bytes + frames);
   uint64_t sum = 0;
   for (const MemoryPool& pool : plan.pools) sum += pool.bytes;

@@ -32,6 +32,7 @@ class ScriptedEngine : public Engine {
     refine_start = T_start;
     return refined;
   }
+  void limit_finest_level(int32_t level) override { finest_level = level; }
   IntegrateResult integrate(const Se3& T) override {
     calls += 'i';
     integrate_pose = T;
@@ -77,7 +78,7 @@ class ScriptedEngine : public Engine {
   Status prepare_status = Status::ok;
   TrackResult tracked, refined;
   TrackResult tracked_again;  ///< by a second call for the same frame
-  int32_t masked_pixels = 0, keyframes = 0, resets = 0;
+  int32_t masked_pixels = 0, keyframes = 0, resets = 0, finest_level = 0;
   PlaceResult place;
   Se3 find_guess;
   float period_s = -1;  ///< told with the last frame

@@ -1,0 +1,84 @@
+#include "runtime/executive/capture.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+
+#include "runtime/core/clock.hpp"
+#include "runtime/record/trajectory_writer.hpp"
+
+namespace stillmap {
+namespace {
+
+constexpr std::chrono::milliseconds kWait{100};  ///< how long a stop may go unseen
+constexpr uint32_t kNotices = 64;                ///< on their way to the log; more are only counted
+
+}  // namespace
+
+Capture::Capture(FrameSource& source, FrameSlots& slots, FrameMailbox& mailbox, RunState& state,
+                 CaptureLimits limits)
+    : source_(source),
+      slots_(slots),
+      mailbox_(mailbox),
+      state_(state),
+      limits_(limits),
+      notices_(kNotices) {}
+
+void Capture::run() {
+  uint32_t slot = 0;
+  bool have_slot = false;
+  uint32_t read = 0;
+  while (!state_.stop.load(std::memory_order_relaxed) &&
+         (limits_.max_frames == 0 || read < limits_.max_frames)) {
+    state_.capture.beat();
+    if (!have_slot) have_slot = slots_.acquire(slot, kWait);
+    if (!have_slot) continue;
+    slots_[slot].frame().captured = {};
+    const Status status = source_.next(slots_[slot].frame(), static_cast<int32_t>(kWait.count()));
+    if (status == Status::timeout) continue;
+    if (status == Status::end) break;
+    if (status != Status::ok && status != Status::bad_data) {
+      error_ = source_.error();
+      state_.faults.hold(Fault::camera_gone, monotonic_ns());
+      break;
+    }
+    ++read;
+    state_.frames_read.fetch_add(1, std::memory_order_relaxed);
+    state_.last_frame_ns.store(monotonic_ns(), std::memory_order_relaxed);
+    if (status == Status::bad_data)
+      pass_over(source_.error());
+    else
+      have_slot = !deliver(slot);
+  }
+  if (have_slot) slots_.release(slot);
+  ended_.store(true, std::memory_order_release);
+}
+
+/// @return whether the slot went on
+bool Capture::deliver(uint32_t slot) {
+  RgbdFrame& frame = slots_[slot].frame();
+  // Stamps have to rise: what comes after (files, filters) relies on it.
+  if (jumps_back(frame)) {
+    pass_over(fmt::format("frame {}: stamp {} is not later than the one before it, {}", frame.sequence,
+                          file_stamp(frame.depth_stamp), file_stamp(last_)));
+    return false;
+  }
+  last_ = frame.depth_stamp;
+  state_.last_stamp_ns.store(last_.ns, std::memory_order_relaxed);
+  ++delivered_;
+  if (frame.captured.ns == 0) frame.captured.ns = monotonic_ns();
+  const int32_t older = mailbox_.put(slot);
+  if (older != FrameMailbox::kEmpty) {
+    slots_.release(static_cast<uint32_t>(older));
+    state_.frames_dropped.fetch_add(1, std::memory_order_relaxed);
+    state_.faults.raise(Fault::frame_dropped, monotonic_ns());
+  }
+  return true;
+}
+
+void Capture::pass_over(const std::string& why) {
+  state_.faults.raise(Fault::bad_frame, monotonic_ns());
+  notices_.push(Notice::make(Notice::Kind::fault, last_, name_of(Fault::bad_frame), why));
+}
+
+}  // namespace stillmap
