@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <mutex>
 
 #include "runtime/ports/messages.hpp"
 #include "runtime/ports/odometry.hpp"
@@ -52,13 +53,18 @@ class FrameOdometry final : public OdometryPort {
 };
 
 /// The odometry of a log: what was answered in the live run is answered again, nothing else.
-/// @thread one at a time
+/// @thread begin_frame: reader; at: another. A log is a recording: a moment's wait for the reader does no
+/// harm
 class LoggedOdometry final : public OdometryPort {
  public:
   /// Before each frame.
-  void begin_frame(const DecisionMessage& decision) { decision_ = decision; }
+  void begin_frame(const DecisionMessage& decision) {
+    const std::lock_guard lock(mutex_);
+    decision_ = decision;
+  }
 
   Status at(Stamp stamp, OdometrySample& sample) override {
+    const std::lock_guard lock(mutex_);
     for (uint32_t i = 0; i < decision_.odometry_answers; ++i) {
       if (decision_.odometry[i].asked != stamp) continue;
       sample = decision_.odometry[i].sample;
@@ -68,6 +74,7 @@ class LoggedOdometry final : public OdometryPort {
   }
 
  private:
+  std::mutex mutex_;
   DecisionMessage decision_;
 };
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "runtime/core/heap_guard.hpp"
 #include "runtime/record/lcm_log_reader.hpp"
 #include "tests/support/contains.hpp"
 #include "tests/support/fake_disk.hpp"
@@ -12,6 +13,7 @@
 namespace stillmap {
 namespace {
 
+using test::FrameMemory;
 using test::LoggedRun;
 
 std::vector<std::string> channels_of(const std::string& path) {
@@ -110,6 +112,31 @@ TEST(LogRecorder, GoesOnWhenThereIsRoomAgain) {
   disk.time_ns += LcmLogWriter::kRetryNs;
   EXPECT_EQ(run.add(3), Status::ok);
   EXPECT_EQ(run.recorder().status(), Status::ok);
+}
+
+TEST(LogRecorder, DoesNotAllocateAfterBoot) {
+  if (!heap_guard::counts()) GTEST_SKIP() << "a sanitizer has its own allocator";
+  const test::TempDir dir;
+  RecordConfig record = LoggedRun::with_frames();
+  record.log_file_bytes = 100000;
+  record.log_max_bytes = 300000;
+  record.log_sync_s = 0.001f;
+  LoggedRun run(dir.path(), record);
+  std::vector<FrameMemory> frames;
+  for (uint32_t n = 0; n < 20; ++n) frames.push_back(test::logged_frame(n));
+  const uint64_t before = heap_guard::allocations();
+  {
+    const heap_guard::Scope armed;
+    for (uint32_t n = 0; n < 1000; ++n) {
+      run.recorder().write(samples::status());
+      run.recorder().write(test::decision_about(n), &frames[n % frames.size()].frame);
+      run.recorder().step();
+    }
+    run.recorder().rotate();
+  }
+  EXPECT_EQ(heap_guard::allocations(), before);
+  EXPECT_EQ(run.recorder().counters().dropped, 0u);
+  EXPECT_GT(run.recorder().counters().files_deleted, 2u);
 }
 
 /// A day of poses and status at 30 Hz, the time between two events as it would be. (A month would not
