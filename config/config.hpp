@@ -104,12 +104,21 @@ struct ArchiveConfig {
   }
 };
 
+enum class RecordColour : uint8_t { lossless, jpeg };
+
 struct RecordConfig {
   bool masks = false;
   bool mesh = true;
   bool map = false;
   float map_every_s = 0;
   bool log = false;
+  float log_max_bytes = 4e9f;
+  float log_file_bytes = 256e6f;
+  float log_file_s = 3600;
+  float log_max_s = 0;
+  float log_sync_s = 1;
+  bool frames = false;
+  RecordColour colour = RecordColour::lossless;
   int32_t snapshots = 8;
   int32_t keep_previous = 3;
 
@@ -121,7 +130,20 @@ struct RecordConfig {
     f("map", &P::map, 0, 1, "bool", "ours", "write map.smap at the end");
     f("map_every_s", &P::map_every_s, 0, 1e6, "s", "ours",
       "with map: write it on the way as well, so often; 0: only at the end");
-    f("log", &P::log, 0, 1, "bool", "ours", "write an LCM event log");
+    f("log", &P::log, 0, 1, "bool", "ours", "write an LCM event log: poses, status and events");
+    f("log_max_bytes", &P::log_max_bytes, 2e5, 1e15, "bytes", "ours",
+      "of the log's files together; the oldest are deleted");
+    f("log_file_bytes", &P::log_file_bytes, 1e5, 1e12, "bytes", "ours",
+      "of one file of the log; then the next begins");
+    f("log_file_s", &P::log_file_s, 1, 1e9, "s", "ours", "so does it after so long");
+    f("log_max_s", &P::log_max_s, 0, 1e9, "s", "ours",
+      "files of the log that were closed so long ago are deleted; 0: only log_max_bytes counts");
+    f("log_sync_s", &P::log_sync_s, 0, 3600, "s", "ours",
+      "so often the log is synced: the most that a power cut takes");
+    f("frames", &P::frames, 0, 1, "bool", "ours",
+      "with log: the images of each frame and what was decided about it, for `stillmap replay`");
+    f("colour", &P::colour, 0, 1, "lossless|jpeg", "ours",
+      "how the log keeps colour; depth is never changed");
     f("snapshots", &P::snapshots, 0, 1000, "frames", "Fig. 1",
       "frames kept with mask and reprojected map for `stillmap picture`");
     f("keep_previous", &P::keep_previous, 0, 100, "runs", "ours", "earlier runs kept in DIR/previous-N");

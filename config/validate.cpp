@@ -123,6 +123,10 @@ void check_source(const SourceConfig& source, Violations& out) {
 void check_record(const RecordConfig& record, Violations& out) {
   out.unless(record.map || record.map_every_s == 0,
              setting("record.map_every_s", record.map_every_s) + ": has no effect while record.map is false");
+  out.unless(record.log || !record.frames, "record.frames = true: has no effect while record.log is false");
+  out.unless(record.log_max_bytes >= 2 * record.log_file_bytes,
+             setting("record.log_max_bytes", record.log_max_bytes) +
+                 ": must be at least twice record.log_file_bytes = " + float_text(record.log_file_bytes));
 }
 
 void check_runtime(const RuntimeConfig& runtime, Violations& out) {

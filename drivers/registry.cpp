@@ -2,6 +2,7 @@
 
 #include "drivers/dataset/sevenscenes_source.hpp"
 #include "drivers/dataset/tum_source.hpp"
+#include "drivers/recording/log_source.hpp"
 #include "drivers/synthetic/synthetic_source.hpp"
 
 namespace stillmap {
@@ -30,14 +31,20 @@ Opened synthetic(const std::string& spec, const SourceOptions& options) {
   return source;
 }
 
+Opened log(const std::string& path, const SourceOptions& options) {
+  auto source = LogSource::open(path, options.dataset);
+  if (!source) return Error{source.error(), source.error_kind()};
+  return std::unique_ptr<FrameSource>(std::move(*source));
+}
+
 constexpr Scheme kSchemes[] = {
     {"tum", "tum:DIR", tum},
     {"sevenscenes", "sevenscenes:DIR", sevenscenes},
     {"synthetic", "synthetic:SCENE[,seed=N][,size=WxH][,seconds=S]", synthetic},
+    {"log", "log:FILE", log},
     {"xtion", "xtion[:SERIAL]", nullptr},
     {"oni", "oni:FILE", nullptr},
     {"v4l2", "v4l2:DEPTH_DEV[,COLOUR_DEV]", nullptr},
-    {"log", "log:FILE", nullptr},
 };
 
 std::string schemes_of_this_build() {

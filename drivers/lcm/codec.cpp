@@ -27,9 +27,9 @@ constexpr uint64_t kFingerprint<CommandMessage> = 0x1a187596c10f0700;
 template <>
 constexpr uint64_t kFingerprint<FrameMessage> = 0xe55d6bb0fd38e560;
 template <>
-constexpr uint64_t kFingerprint<DecisionMessage> = 0xbe610db961511218;
+constexpr uint64_t kFingerprint<DecisionMessage> = 0x58644e1b0cab23bd;
 template <>
-constexpr uint64_t kFingerprint<SessionMessage> = 0x7a95e9d8003ec430;
+constexpr uint64_t kFingerprint<SessionMessage> = 0x534fa6b20e22fff9;
 template <>
 constexpr uint64_t kFingerprint<EventMessage> = 0x772f33c0be0c70c9;
 
@@ -121,6 +121,13 @@ void members(Wire& wire, M& m) {
   wire.bytes(m.colour);
 }
 
+/// Rotation by rows, then the place: what was written is what is read, to the last bit.
+template <class Wire, Is<Se3d> T>
+void pose(Wire& wire, T& T_a_b) {
+  wire.numbers(T_a_b.rotation.m);
+  for (auto* value : {&T_a_b.translation.x, &T_a_b.translation.y, &T_a_b.translation.z}) wire.number(*value);
+}
+
 template <class Wire, Is<DecisionMessage> M>
 void members(Wire& wire, M& m) {
   wire.number(m.utime.us);
@@ -129,10 +136,12 @@ void members(Wire& wire, M& m) {
   wire.one_of(m.shed, Shed::nothing, Shed::finest_level);
   wire.boolean(m.integrated);
   wire.boolean(m.new_map);
-  wire.count(m.restored_groups);
-  wire.boolean(m.has_odometry);
-  wire.numbers(m.T_odom_body);
-  wire.number(m.odometry_stamp.ns);
+  wire.count(m.archive_answers);
+  wire.number(m.odometry_answers);
+  wire.require(m.odometry_answers <= kOdometryAnswers);
+  for (auto& answer : m.odometry) wire.number(answer.asked.ns);
+  for (auto& answer : m.odometry) wire.number(answer.sample.stamp.ns);
+  for (auto& answer : m.odometry) pose(wire, answer.sample.T_odom_body);
 }
 
 template <class Wire, Is<SessionMessage> M>
@@ -146,6 +155,8 @@ void members(Wire& wire, M& m) {
   wire.numbers(m.k);
   wire.numbers(m.distortion);
   wire.number(m.depth_units_per_m);
+  pose(wire, m.T_map_cam);
+  wire.text(m.map, kAnyLength);
 }
 
 template <class Wire, Is<EventMessage> M>

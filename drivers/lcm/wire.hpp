@@ -23,7 +23,7 @@ inline std::string_view cut(std::string_view text, size_t longest) {
   return text.substr(0, longest);
 }
 
-/// Writes as long as there is room; afterwards `size()` is 0.
+/// Writes as long as there is room and all is well; afterwards `size()` is 0.
 class Writer {
  public:
   explicit Writer(View<uint8_t> to) : to_(to) {}
@@ -62,6 +62,7 @@ class Writer {
   void text(const std::array<char, N>& value) {
     text({value.data(), N}, N - 1);
   }
+  void require(bool condition) { fits_ = fits_ && condition; }
   /// An int32_t with their number, then the bytes.
   void bytes(View<const uint8_t> value) {
     number(value.size);

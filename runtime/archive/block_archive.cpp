@@ -163,9 +163,23 @@ BlockArchive::~BlockArchive() {
 
 // --- the loop
 
-void BlockArchive::step(Engine& engine, Vec3 centre_map) {
-  uint32_t number = 0;
-  while (answers_.pop(number)) take_answer(engine, number);
+uint32_t BlockArchive::step(Engine& engine, Vec3 centre_map) {
+  uint32_t taken = 0;
+  for (uint32_t number = 0; answers_.pop(number); ++taken) take_answer(engine, number);
+  order(engine, centre_map);
+  return taken;
+}
+
+bool BlockArchive::repeat_step(Engine& engine, Vec3 centre_map, uint32_t answers) {
+  for (uint32_t taken = 0, number = 0; taken < answers; ++taken) {
+    if (!answers_.pop_within(number, kLongestAnswer)) return false;
+    take_answer(engine, number);
+  }
+  order(engine, centre_map);
+  return true;
+}
+
+void BlockArchive::order(Engine& engine, Vec3 centre_map) {
   erase_doomed();
   fetch_wanted(engine);
   put_away_far(engine, centre_map);

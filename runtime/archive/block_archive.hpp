@@ -53,9 +53,13 @@ class BlockArchive {
   BlockArchive& operator=(const BlockArchive&) = delete;
 
   /// After a frame was integrated.
-  /// @param centre_map of the camera, metres.  @thread the engine's caller; does not allocate, wait or touch
-  /// files
-  void step(Engine& engine, Vec3 centre_map);
+  /// @param centre_map of the camera, metres  @return answers of the background thread that were taken
+  /// @thread the engine's caller; does not allocate, wait or touch files
+  uint32_t step(Engine& engine, Vec3 centre_map);
+  /// A step of an earlier run once more: waits for as many answers as it took, and takes no others. They come
+  /// in the order of what was asked for, so the map changes as it did then.
+  /// @return false: they did not come.  @thread the engine's caller; waits
+  bool repeat_step(Engine& engine, Vec3 centre_map, uint32_t answers);
 
   /// Boot: puts away until the map is below `keep_below`, or nothing more goes.
   /// @return what went wrong, else nothing.  @thread the engine's caller; waits
@@ -99,6 +103,7 @@ class BlockArchive {
 
   BlockArchive(const Options& options, std::string folder, int lock);
 
+  void order(Engine& engine, Vec3 centre_map);
   std::string settle(Engine& engine);
   void take_answer(Engine& engine, uint32_t number);
   void stored(Engine& engine, const Slot& slot);

@@ -10,6 +10,7 @@
 #include "kernels/base/view.hpp"
 #include "runtime/core/fault.hpp"
 #include "runtime/ports/frame_source.hpp"
+#include "runtime/ports/odometry.hpp"
 
 namespace stillmap {
 
@@ -96,8 +97,16 @@ struct FrameMessage {
   uint32_t sequence = 0;
   ImageCoding depth_coding = ImageCoding::none, colour_coding = ImageCoding::none;
   View<const uint8_t> depth, colour;  ///< coded
-  uint32_t crc32c = 0;                ///< of depth, then colour
+  uint32_t crc32c = 0;                ///< checksum_of (runtime/record/frame_coder.hpp)
 };
+
+/// What the odometry said to the pipeline.
+struct OdometryAnswer {
+  Stamp asked;  ///< clock of the odometry, as that of the sample
+  OdometrySample sample;
+};
+/// In one frame: where the body was at the last frame, and at this one.
+inline constexpr uint32_t kOdometryAnswers = 2;
 
 /// What a live run decided about a frame: with the frames it makes the run repeatable. Wire: decision_t.
 struct DecisionMessage {
@@ -105,12 +114,11 @@ struct DecisionMessage {
   uint32_t sequence = 0;
   bool used = false;  ///< false: dropped, a newer one was there
   Shed shed = Shed::nothing;
-  bool integrated = true;
-  bool new_map = false;  ///< the map was given up before this frame
-  uint32_t restored_groups = 0;
-  bool has_odometry = false;
-  double T_odom_body[7] = {0, 0, 0, 0, 0, 0, 1};  ///< as used: x y z, qx qy qz qw
-  Stamp odometry_stamp;
+  bool integrated = true;        ///< false: integration was shed
+  bool new_map = false;          ///< the map was given up before this frame
+  uint32_t archive_answers = 0;  ///< that BlockArchive::step took after this frame
+  uint32_t odometry_answers = 0;
+  OdometryAnswer odometry[kOdometryAnswers];
 };
 
 /// What a log begins with: all that reading its frames needs. Wire: session_t.
@@ -122,6 +130,8 @@ struct SessionMessage {
   double k[4] = {};           ///< fx fy cx cy, pixels
   double distortion[5] = {};  ///< k1 k2 p1 p2 k3
   double depth_units_per_m = 0;
+  Se3d T_map_cam;        ///< pose of the first frame, or where the camera is looked for first in `map`
+  std::string_view map;  ///< the file that the run went on with; empty: none
 };
 
 /// One line of events.log. Wire: event_t.

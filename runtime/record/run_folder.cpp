@@ -42,6 +42,10 @@ std::vector<fs::path> files_of_earlier_run(const fs::path& dir, std::error_code&
   return found;
 }
 
+bool is_unclosed_log(const fs::path& file) {
+  return ends_with(file.filename().string(), ".lcm.part");
+}
+
 fs::path previous(const fs::path& dir, int32_t n) {
   return dir / ("previous-" + std::to_string(n));
 }
@@ -61,7 +65,13 @@ std::string shift_previous(const fs::path& dir, int32_t keep) {
   return {};
 }
 
-std::string move_earlier_run(const fs::path& dir, int32_t keep) {
+/// An event log that its run did not close is readable all the same: nobody writes it any more.
+fs::path name_when_closed(const fs::path& file) {
+  return is_unclosed_log(file) ? file.stem() : file.filename();
+}
+
+/// @param unclosed_logs counts those of the earlier run
+std::string move_earlier_run(const fs::path& dir, int32_t keep, uint32_t& unclosed_logs) {
   std::error_code code;
   const std::vector<fs::path> files = files_of_earlier_run(dir, code);
   if (code) return reason(dir, "be read", code);
@@ -70,8 +80,9 @@ std::string move_earlier_run(const fs::path& dir, int32_t keep) {
   if (keep > 0) fs::create_directory(previous(dir, 1), code);
   if (code) return reason(previous(dir, 1), "be made", code);
   for (const fs::path& file : files) {
+    unclosed_logs += is_unclosed_log(file);
     if (keep > 0)
-      fs::rename(file, previous(dir, 1) / file.filename(), code);
+      fs::rename(file, previous(dir, 1) / name_when_closed(file), code);
     else
       fs::remove_all(file, code);
     if (code) return reason(file, "be moved away", code);
@@ -100,8 +111,10 @@ Result<RunFolder> RunFolder::open(const std::string& dir, int32_t keep_previous)
   if (code) return Error{reason(dir, "be made", code)};
   if (!fs::is_directory(dir, code)) return Error{dir + ": is not a folder; give --out the name of a folder"};
   if (std::string error = probe(dir); !error.empty()) return Error{error};
-  if (std::string error = move_earlier_run(dir, keep_previous); !error.empty()) return Error{error};
-  return RunFolder(dir);
+  RunFolder folder(dir);
+  if (std::string error = move_earlier_run(dir, keep_previous, folder.unclosed_logs_); !error.empty())
+    return Error{error};
+  return folder;
 }
 
 std::string RunFolder::make(const std::string& name) const {

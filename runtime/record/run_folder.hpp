@@ -22,11 +22,14 @@ class RunFolder {
   std::string make(const std::string& name) const;
   std::string path(std::string_view name) const { return dir_ + "/" + std::string(name); }
   const std::string& dir() const { return dir_; }
+  /// Files of the event log that the earlier run did not close: it was stopped hard. They lost their `.part`.
+  uint32_t unclosed_logs() const { return unclosed_logs_; }
 
  private:
   explicit RunFolder(std::string dir);
 
   std::string dir_;
+  uint32_t unclosed_logs_ = 0;
 };
 
 }  // namespace stillmap

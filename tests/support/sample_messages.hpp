@@ -70,15 +70,21 @@ inline FrameMessage frame() {
   return m;
 }
 
+inline Se3d transform(double about) {
+  return exp(Twistd{{about, 2 * about, -1}, {0.5, -about, 0.1}});
+}
+
 inline DecisionMessage decision() {
   DecisionMessage m;
   m.utime.us = 1764000000123461;
   m.sequence = 5;
   m.used = true, m.shed = Shed::every_second_integration, m.integrated = false, m.new_map = true;
-  m.restored_groups = 9;
-  m.has_odometry = true;
-  for (int i = 0; i < 7; ++i) m.T_odom_body[i] = 0.1 * (i + 1);
-  m.odometry_stamp.ns = 123456789012345;
+  m.archive_answers = 9;
+  m.odometry_answers = kOdometryAnswers;
+  for (int i = 0; i < 2; ++i) {
+    m.odometry[i].asked.ns = 123456789012345 + i;
+    m.odometry[i].sample = {Stamp{123456789000000 + i}, transform(0.1 * (i + 1))};
+  }
   return m;
 }
 
@@ -90,6 +96,7 @@ inline SessionMessage session() {
   for (int i = 0; i < 4; ++i) m.k[i] = 500.5 + i;
   for (int i = 0; i < 5; ++i) m.distortion[i] = -0.1 * i;
   m.depth_units_per_m = 5000;
+  m.T_map_cam = transform(0.3), m.map = "/maps/hall.smap";
   return m;
 }
 

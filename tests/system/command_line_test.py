@@ -127,7 +127,7 @@ class Usage(Case):
         for arguments in [["run", "--source", SMALL, "--device", "cuda"],
                           ["run", "--source", SMALL, "--set", "record.log=true"],
                           ["run", "--source", "xtion"],
-                          ["replay", "a.lcm"], ["doctor"],
+                          ["doctor"],
                           ["bench", "soak"]]:
             done = self.refused(2, *arguments)
             self.assertIn("build", done.stderr, arguments)

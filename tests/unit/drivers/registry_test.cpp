@@ -49,8 +49,12 @@ TEST(Registry, UnknownSchemesListTheValidOnes) {
 }
 
 TEST(Registry, SchemesOfOtherBuildsSaySo) {
-  for (const char* source : {"xtion", "xtion:123", "oni:a.oni", "v4l2:/dev/video0", "log:a.lcm"})
+  for (const char* source : {"xtion", "xtion:123", "oni:a.oni", "v4l2:/dev/video0"})
     expect_refused(source, ErrorKind::bad_usage, "is not part of this build");
+}
+
+TEST(Registry, LogsThatAreNotThereCannotBeOpened) {
+  expect_refused("log:/nowhere/log-000001.lcm", ErrorKind::cannot_open, "there is no such file");
 }
 
 TEST(Registry, SchemesWithoutTheRestSayWhatIsExpected) {

@@ -89,13 +89,22 @@ stillmap::frame_t lcm_frame(const FrameMessage& m) {
   return t;
 }
 
+void copy_transform(const Se3d& from, double* to) {
+  std::copy_n(from.rotation.m, 9, to);
+  to[9] = from.translation.x, to[10] = from.translation.y, to[11] = from.translation.z;
+}
+
 stillmap::decision_t lcm_decision(const DecisionMessage& m) {
   stillmap::decision_t t;
   t.utime = m.utime.us, t.sequence = m.sequence, t.used = m.used;
   t.shed = stillmap::status_t::SHED_EVERY_SECOND_INTEGRATION;
-  t.integrated = m.integrated, t.new_map = m.new_map, t.restored_groups = m.restored_groups;
-  t.has_odometry = m.has_odometry, t.odometry_stamp_ns = m.odometry_stamp.ns;
-  std::copy_n(m.T_odom_body, 7, t.T_odom_body);
+  t.integrated = m.integrated, t.new_map = m.new_map, t.archive_answers = m.archive_answers;
+  t.odometry_answers = static_cast<int32_t>(m.odometry_answers);
+  for (size_t i = 0; i < kOdometryAnswers; ++i) {
+    t.odometry_asked_ns[i] = m.odometry[i].asked.ns;
+    t.odometry_stamp_ns[i] = m.odometry[i].sample.stamp.ns;
+    copy_transform(m.odometry[i].sample.T_odom_body, t.T_odom_body[i]);
+  }
   return t;
 }
 
@@ -105,6 +114,8 @@ stillmap::session_t lcm_session(const SessionMessage& m) {
   t.width = m.width, t.height = m.height, t.depth_units_per_m = m.depth_units_per_m;
   std::copy_n(m.k, 4, t.k);
   std::copy_n(m.distortion, 5, t.distortion);
+  copy_transform(m.T_map_cam, t.T_map_cam);
+  t.map = m.map;
   return t;
 }
 

@@ -46,6 +46,17 @@ TEST(RunFolder, MovesEarlierRunsAndKeepsTheNewestOnes) {
   EXPECT_FALSE(exists(dir.path("previous-3")));
 }
 
+TEST(RunFolder, TakesOverAnEventLogThatWasNotClosed) {
+  TempDir dir;
+  dir.write("log-000001.lcm", "closed");
+  dir.write("log-000002.lcm.part", "not closed");
+  const auto folder = RunFolder::open(dir.path(), 1);
+  ASSERT_TRUE(folder) << folder.error();
+  EXPECT_EQ(folder->unclosed_logs(), 1u);
+  EXPECT_EQ(read_text(dir.path("previous-1/log-000001.lcm")), "closed");
+  EXPECT_EQ(read_text(dir.path("previous-1/log-000002.lcm")), "not closed");
+}
+
 TEST(RunFolder, FewerKeptRemovesTheOlderOnes) {
   TempDir dir;
   for (int i = 0; i < 4; ++i) {
