@@ -45,7 +45,7 @@ class Membership {
   std::atomic<bool> holds_{false};
   std::mutex mutex_;
   std::condition_variable_any never_;  ///< nothing but the stop wakes it up; allocates when it is made
-  std::jthread thread_;  ///< last: it uses all the others
+  std::jthread thread_;                ///< last: it uses all the others
 };
 
 class LcmBus final : public MessageBus {
