@@ -119,6 +119,8 @@ struct RecordConfig {
   float log_sync_s = 1;
   bool frames = false;
   RecordColour colour = RecordColour::lossless;
+  float stream_bytes = 100e6f;
+  int32_t streams_kept = 2;
   int32_t snapshots = 8;
   int32_t keep_previous = 3;
 
@@ -144,6 +146,9 @@ struct RecordConfig {
       "with log: the images of each frame and what was decided about it, for `stillmap replay`");
     f("colour", &P::colour, 0, 1, "lossless|jpeg", "ours",
       "how the log keeps colour; depth is never changed");
+    f("stream_bytes", &P::stream_bytes, 1e4, 1e12, "bytes", "ours",
+      "of trajectory.txt, states.csv, timing.csv each; then the next begins, and this is NAME.1");
+    f("streams_kept", &P::streams_kept, 0, 1000, "files", "ours", "NAME.1, NAME.2, ... kept of each");
     f("snapshots", &P::snapshots, 0, 1000, "frames", "Fig. 1",
       "frames kept with mask and reprojected map for `stillmap picture`");
     f("keep_previous", &P::keep_previous, 0, 100, "runs", "ours", "earlier runs kept in DIR/previous-N");

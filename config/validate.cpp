@@ -140,7 +140,6 @@ void check_missing_parts(const Config& config, Violations& out) {
   const char* missing = " is not part of this build; ";
   if (config.depth.invalid == InvalidDepth::complete)
     out.add(std::string("depth.invalid = complete") + missing + "set depth.invalid = \"ignore\"");
-  if (config.record.log) out.add(std::string("record.log = true") + missing + "set record.log = false");
 }
 
 }  // namespace

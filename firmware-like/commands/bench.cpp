@@ -14,7 +14,7 @@ int bench(const BenchOptions& o) {
   if (o.what == "relocalise") return bench_relocalise(o);
   if (o.what == "scale") return bench_scale(o);
   if (o.what == "free_space") return bench_free_space(o);
-  return fail("bench " + o.what + ": this part is not in this build", ErrorKind::bad_usage);
+  return bench_soak(o);
 }
 
 }  // namespace
@@ -46,7 +46,9 @@ void add_bench(CLI::App& app, int& exit_code) {
   command->add_flag("--twins", o->twins, "accuracy: also the static twin of each --source that moves");
   command->add_option("--skip-frames", o->skip_frames, "accuracy: pass over the first frames of recordings");
   command->add_option("--max-frames", o->max_frames,
-                      "accuracy: stop recordings after so many frames (0: all)");
+                      "accuracy: stop recordings after so many frames (0: all); soak: frames of the run "
+                      "(0: 10000)");
+  command->add_option("--lcm", o->lcm, "soak: LCM URL or off")->capture_default_str();
   command->add_option("--seed", o->seed, "relocalise: another draw of places")
       ->check(CLI::Range(0, 1000000))
       ->capture_default_str();

@@ -20,6 +20,7 @@ struct BenchOptions {
   int32_t seed = 1;
   bool brief = false;
   bool json = false;
+  std::string lcm = "off";
 };
 
 /// Times of every step over a preloaded clip. @return the exit code
@@ -36,5 +37,9 @@ int bench_scale(const BenchOptions& options);
 
 /// What both forms of free space know and take. @return the exit code; failed when a bar is missed
 int bench_free_space(const BenchOptions& options);
+
+/// A long run over a few frames with every output on. @return the exit code; failed when a real-time thread
+/// used the heap or the memory grew
+int bench_soak(const BenchOptions& options);
 
 }  // namespace stillmap

@@ -7,6 +7,7 @@
 #include "firmware-like/commands/command.hpp"
 #include "firmware-like/commands/stop_signal.hpp"
 #include "runtime/archive/map_saver.hpp"
+#include "runtime/record/log_recorder.hpp"
 
 namespace stillmap {
 
@@ -80,6 +81,9 @@ MemoryPlan plan_memory(const Config& config, const EngineParams& params) {
     plan.add("archive: groups on their way", BlockArchive::planned_bytes(archive_options(config)));
   if (config.record.map)
     plan.add("map on its way to disk", MapSaver::planned_bytes(plan_group_capacity(params)));
+  if (config.record.log)
+    plan.add("event log",
+             LogRecorder::planned_bytes(config.record, params.camera.k.height, params.camera.k.width));
   return plan;
 }
 

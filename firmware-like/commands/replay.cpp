@@ -82,7 +82,7 @@ class Replay {
     item.has_frame = true;
     item.result = pipeline_.process(frame, work_of(decision));
     if (archive_) repeat_archive(decision);
-    item.shed = static_cast<uint32_t>(decision.shed);
+    item.decision = decision;
     item.counters = pipeline_.counters();
     if (archive_) item.archive = archive_->counters();
     outputs_.add(item, &frame, engine_.mask_image());

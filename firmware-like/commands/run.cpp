@@ -12,6 +12,7 @@
 #include <thread>
 #include <utility>
 
+#include "config/describe.hpp"
 #include "config/engine_params.hpp"
 #include "config/memory_plan.hpp"
 #include "drivers/lcm/lcm.hpp"
@@ -29,7 +30,9 @@
 #include "runtime/archive/map_file.hpp"
 #include "runtime/core/clock.hpp"
 #include "runtime/core/heap_guard.hpp"
+#include "runtime/core/version.hpp"
 #include "runtime/executive/executive.hpp"
+#include "runtime/executive/looped_source.hpp"
 #include "runtime/executive/paced_source.hpp"
 
 namespace stillmap {
@@ -57,8 +60,8 @@ struct Lcm {
 Result<Lcm> open_lcm(const RunOptions& o, const Config& config, const UtcClock& clock, bool live) {
   Lcm lcm;
   const std::string url = !o.lcm.empty() ? o.lcm : live ? kLcmDefaultUrl : "off";
-  if (url == "off") return lcm;
   lcm.codec = make_lcm_codec();
+  if (url == "off") return lcm;
   auto bus = open_lcm_bus(url);
   if (!bus) return Error{"--lcm " + bus.error(), bus.error_kind()};
   lcm.bus = std::move(*bus);
@@ -173,6 +176,30 @@ std::string copy_map(const RunFolder& folder, const std::string& file) {
   return error ? folder.path(file) + ": " + error.message() : std::string();
 }
 
+/// What a replay has to know of the run.
+SessionMessage session_of(const FrameSource& source, const RunPlan& plan, const RunOptions& o,
+                          const std::optional<MapFile>& map, const std::string& config_toml,
+                          const UtcClock& clock) {
+  const CameraModel& camera = source.info().camera;
+  const auto wide = [](float x) { return static_cast<double>(x); };
+  SessionMessage session;
+  session.utime.us = clock.to_utc_us(monotonic_ns());
+  session.version = version();
+  session.source = source.info().name;
+  session.config_toml = config_toml;
+  session.width = camera.k.width;
+  session.height = camera.k.height;
+  const float k[] = {camera.k.fx, camera.k.fy, camera.k.cx, camera.k.cy};
+  std::transform(std::begin(k), std::end(k), session.k, wide);
+  const Distortion& d = camera.distortion;
+  const float distortion[] = {d.k1, d.k2, d.p1, d.p2, d.k3};
+  std::transform(std::begin(distortion), std::end(distortion), session.distortion, wide);
+  session.depth_units_per_m = wide(source.info().depth_units_per_m);
+  session.T_map_cam = map && o.initial_pose.empty() ? map->info().T_map_cam : plan.T_map_cam;
+  session.map = o.map;
+  return session;
+}
+
 /// All of a run but its source, which is open.
 int run_with(FrameSource& source, const RunOptions& o, const RunPlan& plan, std::optional<MapFile>& map,
              Lcm& lcm, UtcClock& clock, ServiceManager* service, FrameObserver* observer) {
@@ -214,17 +241,25 @@ int run_with(FrameSource& source, const RunOptions& o, const RunPlan& plan, std:
   outputs.event(Stamp{}, "start", fmt::format("{}, cpu engine, {} threads", info.name, params.threads));
   if (!loaded_text.empty()) outputs.event(Stamp{}, "map_load", loaded_text);
 
-  OdometryPort* odometry = lcm.odometry ? lcm.odometry.get() : source.odometry();
-  Pipeline pipeline(*engine, config, plan.T_map_cam, odometry);
+  FrameOdometry odometry(lcm.odometry ? lcm.odometry.get() : source.odometry());
+  Pipeline pipeline(*engine, config, plan.T_map_cam, &odometry);
   if (map) pipeline.start_lost(o.initial_pose.empty() ? map->info().T_map_cam : plan.T_map_cam);
   Progress progress(frames, o.quiet);
   outputs.show_progress(&progress);
   outputs.watch(&state, archive->get());
+  if (config.record.log && outputs.folder()) {
+    const std::string config_toml = to_toml(config);
+    auto log = LogRecorder::create(config.record, outputs.folder()->dir(),
+                                   session_of(source, plan, o, map, config_toml, clock), *lcm.codec);
+    if (!log) return fail(log.error(), log.error_kind());
+    outputs.log_to(std::move(*log), MessageMaker(config, clock, state, plan.T_map_cam), clock);
+  }
 
   PacedSource paced(source);
   FrameSource& frames_from = o.realtime && !is_camera(o.source) ? paced : source;
   ExecutiveParts parts{frames_from, *engine, pipeline, outputs, state, clock};
   parts.archive = archive->get();
+  parts.odometry = &odometry;
   std::optional<MapKeeper> keeper;
   std::optional<Snapshots> snapshots;
   if (const RunFolder* folder = outputs.folder()) {
@@ -255,7 +290,8 @@ int run_with(FrameSource& source, const RunOptions& o, const RunPlan& plan, std:
   if (metrics) parts.on_status = [&metrics](const StatusMessage& status) { metrics->show(status); };
 
   Executive executive(parts, config,
-                      {plan.T_map_cam, o.max_frames, live, outputs.folder() && config.record.masks});
+                      {plan.T_map_cam, o.max_frames, live,
+                       outputs.folder() && (config.record.masks || config.record.frames)});
   const RunEnd end = executive.run();
   progress.finish();
   const double seconds = progress.seconds();
@@ -284,7 +320,9 @@ int run(const RunOptions& o, FrameObserver* observer) {
   auto source = open_waiting(o.source, plan->config, service.get(), *lcm, clock);
   if (!source) return stop_requested() ? kExitDone : fail(source.error(), source.error_kind());
   (*source)->skip(o.skip_frames);
-  return run_with(**source, o, *plan, *map, *lcm, clock, service.get(), observer);
+  std::optional<LoopedSource> looped;
+  if (o.loop_frames > 0) looped.emplace(**source, o.loop_frames);
+  return run_with(looped ? *looped : **source, o, *plan, *map, *lcm, clock, service.get(), observer);
 }
 
 void add_run(CLI::App& app, int& exit_code) {

@@ -22,6 +22,7 @@ struct RunOptions {
   uint32_t skip_frames = 0;
   std::vector<std::string> settings;
   bool realtime = false, quiet = false;
+  uint32_t loop_frames = 0;  ///< no flag: so many frames are read at boot and then played to and fro for ever
 };
 
 /// What a run needs to know, checked.

@@ -13,6 +13,7 @@
 
 #include "config/describe.hpp"
 #include "config/engine_params.hpp"
+#include "firmware-like/commands/stop_signal.hpp"
 #include "runtime/archive/whole_mesh.hpp"
 #include "runtime/core/clock.hpp"
 #include "runtime/core/heap_guard.hpp"
@@ -63,6 +64,10 @@ std::string RunOutputs::open(const std::string& dir) {
     if (std::string error = folder->make(name); !error.empty()) return error;
   if (std::string error = write_whole_file(folder->path("config.toml"), to_toml(config_)); !error.empty())
     return error;
+  const auto most_bytes = static_cast<uint64_t>(record_.stream_bytes);
+  trajectory->file().rotate_at(most_bytes, record_.streams_kept);
+  states->rotate_at(most_bytes, record_.streams_kept);
+  timing->rotate_at(most_bytes, record_.streams_kept);
   events_ = std::move(*events);
   files_.emplace(
       Files{std::move(*folder), std::move(*trajectory), std::move(*states), std::move(*timing), {}});
@@ -93,7 +98,47 @@ void RunOutputs::add(const Notice& notice) {
   }
 }
 
+void RunOutputs::log_to(std::unique_ptr<LogRecorder> log, MessageMaker maker, const UtcClock& clock) {
+  log_ = std::move(log);
+  maker_.emplace(std::move(maker));
+  clock_ = &clock;
+  events_.set_listener([this](bool fault, std::string_view name, std::string_view text) {
+    EventMessage message;
+    message.utime.us = clock_->to_utc_us(monotonic_ns());
+    message.fault = fault;
+    message.name = name.substr(0, kEventNameBytes);
+    message.text = text.substr(0, kEventTextBytes);
+    note_log(log_->write(message));
+  });
+}
+
+void RunOutputs::add_to_log(const RunItem& item, const RgbdFrame* frame) {
+  const PublishItem published{item.result, true, item.pose_epoch, item.map_id};
+  if (item.result.state != TrackingState::lost) note_log(log_->write(maker_->pose(published)));
+  note_log(log_->write(maker_->status(published, 0)));
+  DecisionMessage decision = item.decision;
+  decision.utime.us = clock_->to_utc_us(item.result.captured.ns);
+  note_log(log_->write(decision, frame));
+}
+
+/// What keeps an event from the log is a fault that holds until one gets there again.
+void RunOutputs::note_log(Status status) {
+  if (!state_) return;
+  const int64_t now_ns = monotonic_ns();
+  if (status == Status::ok) {
+    state_->faults.clear(Fault::log_full);
+    state_->faults.clear(Fault::record_failed);
+  } else {
+    state_->faults.hold(status == Status::capacity_exhausted ? Fault::log_full : Fault::record_failed,
+                        now_ns);
+  }
+}
+
 void RunOutputs::idle() {
+  if (log_) {
+    if (rotation_requested()) log_->rotate();
+    if (const Status status = log_->step(); status != Status::ok) note_log(status);
+  }
   if (std::chrono::steady_clock::now() < report_due_) return;
   rewrite_report();
   report_due_ += kReportPeriod;
@@ -119,6 +164,7 @@ void RunOutputs::add_frame(const RunItem& item, const RgbdFrame* frame, ImageVie
       tell(file->error());
     tell(events_.error());
   }
+  if (log_) add_to_log(item, frame);
   if (archive_) note_archive_trouble(item.archive);
   last_ = result;
   ++frames_seen_;
@@ -170,6 +216,7 @@ void RunOutputs::add_truth(const RunItem& item) {
     auto writer = TrajectoryWriter::create(files_->folder.path("truth.txt"));
     if (!writer) return tell(writer.error());
     files_->truth.emplace(std::move(*writer));
+    files_->truth->file().rotate_at(static_cast<uint64_t>(record_.stream_bytes), record_.streams_kept);
   }
   files_->truth->write(result.stamp, truth_.to_map(*item.truth_T_world_cam));
   tell(files_->truth->file().error());
@@ -339,6 +386,8 @@ void RunOutputs::finish(Engine& engine, const FrameSource& source, const Pipelin
                fmt::format("{} frames; at most {} blocks with voxels in one view", counters.frames,
                            counters.most_visible_blocks));
   rewrite_report();
+  events_.set_listener({});
+  if (log_ && !log_->close()) tell(log_->error());
   if (files_ && !events_.close()) tell(events_.error());
 }
 

@@ -15,10 +15,12 @@
 #include "runtime/archive/block_archive.hpp"
 #include "runtime/archive/map_saver.hpp"
 #include "runtime/executive/counters.hpp"
+#include "runtime/executive/message_maker.hpp"
 #include "runtime/executive/run_item.hpp"
 #include "runtime/ports/frame_source.hpp"
 #include "runtime/ports/run_recorder.hpp"
 #include "runtime/record/events_log.hpp"
+#include "runtime/record/log_recorder.hpp"
 #include "runtime/record/report.hpp"
 #include "runtime/record/run_folder.hpp"
 #include "runtime/record/states_writer.hpp"
@@ -39,8 +41,11 @@ class RunOutputs final : public RunRecorder {
                                                     const SourceInfo& source, int64_t frames, Report report);
 
   void show_progress(Progress* progress) { progress_ = progress; }
+  /// Everything goes into this event log as well. @param maker of its own: it goes from frame to frame
+  /// @param clock outlives this
+  void log_to(std::unique_ptr<LogRecorder> log, MessageMaker maker, const UtcClock& clock);
   /// The report's faults and counters come from there. @param state outlives this
-  void watch(const RunState* state, const BlockArchive* archive) {
+  void watch(RunState* state, const BlockArchive* archive) {
     state_ = state;
     archive_ = archive;
   }
@@ -86,6 +91,8 @@ class RunOutputs final : public RunRecorder {
   void add_frame(const RunItem& item, const RgbdFrame* frame, ImageView<const uint8_t> mask);
   void add_event(const RunEvent& event);
   void bad_frame(Stamp stamp, const std::string& why);
+  void add_to_log(const RunItem& item, const RgbdFrame* frame);
+  void note_log(Status status);
   void note_changes(const FrameResult& result);
   void add_truth(const RunItem& item);
   void add_masks(const RgbdFrame& frame, const FrameResult& result, ImageView<const uint8_t> mask);
@@ -115,7 +122,10 @@ class RunOutputs final : public RunRecorder {
   double mesh_seconds_ = 0;
   uint64_t mesh_triangles_ = 0;
   Progress* progress_ = nullptr;
-  const RunState* state_ = nullptr;
+  RunState* state_ = nullptr;
+  std::unique_ptr<LogRecorder> log_;  ///< null: record.log is off
+  std::optional<MessageMaker> maker_;
+  const UtcClock* clock_ = nullptr;
   const BlockArchive* archive_ = nullptr;
   PipelineCounters counters_;
   std::chrono::steady_clock::time_point report_due_ = std::chrono::steady_clock::now() + kReportPeriod;

@@ -59,7 +59,7 @@ Executive::Executive(ExecutiveParts parts, const Config& config, const Executive
       notices_(kNotices),
       capture_(p_.source, slots_, mailbox_, p_.state, {options.max_frames}),
       loop_({p_.engine, p_.pipeline, capture_, slots_, mailbox_, p_.state, to_publish_, to_record_,
-             p_.archive, p_.map_keeper, p_.observers},
+             p_.archive, p_.map_keeper, p_.odometry, p_.observers},
             {static_cast<double>(config.lost.new_map_after_s), static_cast<double>(config.runtime.period_ms),
              options.live, options.keep_images}),
       publish_(MessageMaker(config, p_.clock, p_.state, options.T_map_cam), to_publish_, p_.state, p_.codec,

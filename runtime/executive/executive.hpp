@@ -35,6 +35,7 @@ struct ExecutiveParts {
   UtcClock& clock;
   BlockArchive* archive = nullptr;
   MapKeeper* map_keeper = nullptr;
+  FrameOdometry* odometry = nullptr;
   const MessageCodec* codec = nullptr;
   MessageBus* bus = nullptr;
   CommandPort* commands = nullptr;

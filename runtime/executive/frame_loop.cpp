@@ -39,8 +39,11 @@ void FrameLoop::work_on(uint32_t slot) {
   {
     const heap_guard::Scope armed;
     const FrameWork work = limits_.live ? FrameWork{load_.integrate(), load_.finest_level()} : FrameWork{};
+    decide(frame, work);
+    if (p_.odometry) p_.odometry->begin_frame();
     result = p_.pipeline.process(frame, work, this);
-    if (p_.archive) p_.archive->step(p_.engine, p_.pipeline.centre_map());
+    if (p_.odometry) p_.odometry->log(decision_);
+    if (p_.archive) decision_.archive_answers = p_.archive->step(p_.engine, p_.pipeline.centre_map());
     if (limits_.live) count_lateness(result);
     note_faults(result);
     note_discontinuity();
@@ -53,6 +56,17 @@ void FrameLoop::work_on(uint32_t slot) {
   obey_requests(result.stamp);
   last_ = result;
   ++frames_;
+}
+
+/// What a replay has to know of this frame.
+void FrameLoop::decide(const RgbdFrame& frame, const FrameWork& work) {
+  const bool new_map = decision_.new_map;
+  decision_ = {};
+  decision_.sequence = frame.sequence;
+  decision_.used = true;
+  decision_.shed = load_.shed();
+  decision_.integrated = work.integrate;
+  decision_.new_map = new_map;
 }
 
 /// The camera's period by the stamps: the shortest so far, since frames may have been skipped.
@@ -137,6 +151,7 @@ void FrameLoop::give_up_map(Stamp stamp) {
 
 void FrameLoop::start_new_map(const RunEvent& why) {
   tell(why);
+  decision_.new_map = true;  // of the frame that comes next
   p_.pipeline.start_new_map();
   if (p_.archive) p_.archive->forget();
   p_.state.pose_epoch.fetch_add(1, std::memory_order_relaxed);
@@ -158,10 +173,10 @@ void FrameLoop::hand_on(uint32_t slot, const FrameResult& result) {
   item.has_frame = true;
   item.result = result;
   item.truth_T_world_cam = p_.slots[slot].frame().truth_T_world_cam;
-  item.shed = p_.state.shed.load(std::memory_order_relaxed);
-  const uint32_t dropped = p_.state.frames_dropped.load(std::memory_order_relaxed);
-  item.dropped_before = dropped - dropped_;
-  dropped_ = dropped;
+  item.decision = decision_;
+  decision_.new_map = false;
+  item.pose_epoch = p_.state.pose_epoch.load(std::memory_order_relaxed);
+  item.map_id = p_.state.map_id.load(std::memory_order_relaxed);
   item.counters = p_.pipeline.counters();
   if (p_.archive) item.archive = p_.archive->counters();
   // Not live, the only slot always goes on and comes back when the frame is on disk: nothing is lost. Live,

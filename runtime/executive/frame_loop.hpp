@@ -12,6 +12,7 @@
 #include "runtime/executive/map_keeper.hpp"
 #include "runtime/executive/run_item.hpp"
 #include "runtime/ports/frame_observer.hpp"
+#include "runtime/ports/frame_odometry.hpp"
 
 namespace stillmap {
 
@@ -27,6 +28,7 @@ struct FrameLoopParts {
   RunQueue& to_record;
   BlockArchive* archive = nullptr;        ///< null: far parts of a full map are dropped
   MapKeeper* map_keeper = nullptr;        ///< null: the map is not saved on the way
+  FrameOdometry* odometry = nullptr;      ///< that the pipeline asks; null: there is none
   std::vector<FrameObserver*> observers;  ///< measuring; they are outside of what real time is asked for
 };
 
@@ -54,6 +56,7 @@ class FrameLoop final : public PoseListener {
 
  private:
   void work_on(uint32_t slot);
+  void decide(const RgbdFrame& frame, const FrameWork& work);
   void count_lateness(const FrameResult& result);
   void note_faults(const FrameResult& result);
   void note_discontinuity();
@@ -72,8 +75,8 @@ class FrameLoop final : public PoseListener {
   LoadShedder load_;
   FrameResult last_;
   uint32_t frames_ = 0;
-  uint32_t relocalised_ = 0, new_maps_ = 0;
-  uint32_t dropped_ = 0;  ///< as counted when the last frame was handed on
+  uint32_t relocalised_ = 0;
+  DecisionMessage decision_;  ///< about this frame; new_map: about the next one
   double shortest_ms_ = 0;
 };
 

@@ -9,7 +9,7 @@
 #include "runtime/archive/block_archive.hpp"
 #include "runtime/core/bounded_queue.hpp"
 #include "runtime/pipeline/pipeline.hpp"
-#include "runtime/ports/frame_source.hpp"
+#include "runtime/ports/messages.hpp"
 
 namespace stillmap {
 
@@ -34,8 +34,9 @@ struct RunItem {
   FrameResult result;
   int32_t slot = kNoSlot;  ///< images of the frame; the record thread gives it back
   std::optional<Se3d> truth_T_world_cam;
-  uint32_t shed = 0;  ///< Shed, while it was worked on
-  uint32_t dropped_before = 0;
+  DecisionMessage decision;  ///< its stamp is left for the record thread
+  uint32_t pose_epoch = 0;
+  uint64_t map_id = 0;
   PipelineCounters counters;
   ArchiveCounters archive;
   RunEvent event;

@@ -134,6 +134,8 @@ struct SessionMessage {
   std::string_view map;  ///< the file that the run went on with; empty: none
 };
 
+inline constexpr uint32_t kEventNameBytes = 64, kEventTextBytes = 1000;
+
 /// One line of events.log. Wire: event_t.
 struct EventMessage {
   Utime utime;

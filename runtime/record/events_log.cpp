@@ -37,6 +37,7 @@ void EventsLog::line(Stamp stamp, std::string_view kind, std::string_view name, 
   std::replace(one_line.begin(), one_line.end(), '\n', ' ');
   if (count == kMaxLinesPerName) one_line += " (further ones are counted only)";
   if (file_) file_->write(fmt::format("{} {} {}: {}\n", file_stamp(stamp), kind, name, one_line));
+  if (listener_) listener_(kind == "fault", name, one_line);
 }
 
 }  // namespace stillmap

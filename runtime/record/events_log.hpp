@@ -1,10 +1,12 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "runtime/ports/frame_source.hpp"
 #include "runtime/record/output_file.hpp"
@@ -26,6 +28,10 @@ class EventsLog {
   void warning(Stamp stamp, std::string_view name, std::string_view text);
   void fault(Stamp stamp, std::string_view name, std::string_view text);
 
+  /// Hears every line that is written down.
+  using Listener = std::function<void(bool fault, std::string_view name, std::string_view text)>;
+  void set_listener(Listener listener) { listener_ = std::move(listener); }
+
   const std::map<std::string, uint64_t, std::less<>>& faults() const { return faults_; }
   /// @return false when something could not be written, see error()
   bool close() { return !file_ || file_->close(); }
@@ -37,6 +43,7 @@ class EventsLog {
   void line(Stamp stamp, std::string_view kind, std::string_view name, std::string_view text);
 
   std::optional<OutputFile> file_;
+  Listener listener_;
   std::map<std::string, uint64_t, std::less<>> faults_, lines_;
 };
 

@@ -35,7 +35,10 @@ OutputFile::OutputFile(OutputFile&& other) noexcept
       kind_(other.kind_),
       fd_(std::exchange(other.fd_, -1)),
       good_bytes_(other.good_bytes_),
-      buffer_(std::move(other.buffer_)) {}
+      buffer_(std::move(other.buffer_)),
+      rotate_at_(other.rotate_at_),
+      kept_(other.kept_),
+      header_(std::move(other.header_)) {}
 
 OutputFile& OutputFile::operator=(OutputFile&& other) noexcept {
   std::swap(path_, other.path_);
@@ -44,6 +47,9 @@ OutputFile& OutputFile::operator=(OutputFile&& other) noexcept {
   std::swap(fd_, other.fd_);
   std::swap(good_bytes_, other.good_bytes_);
   std::swap(buffer_, other.buffer_);
+  std::swap(rotate_at_, other.rotate_at_);
+  std::swap(kept_, other.kept_);
+  std::swap(header_, other.header_);
   return *this;
 }
 
@@ -61,11 +67,34 @@ bool OutputFile::write(std::string_view record) {
 
 bool OutputFile::write(const void* bytes, size_t count) {
   if (failed() || fd_ < 0) return false;
+  const bool full = rotate_at_ > 0 && good_bytes_ + count > rotate_at_ && good_bytes_ > header_.size();
+  if (full && !rotate()) return false;
   const char* from = static_cast<const char*>(bytes);
   if (kind_ == Kind::stream || count >= kBufferBytes) return flush() && put(from, count);
   if (buffer_.size() + count > kBufferBytes && !flush()) return false;
   buffer_.insert(buffer_.end(), from, from + count);
   return true;
+}
+
+void OutputFile::rotate_at(uint64_t bytes, int32_t kept, std::string header) {
+  rotate_at_ = bytes;
+  kept_ = kept;
+  header_ = std::move(header);
+}
+
+bool OutputFile::rotate() {
+  if (!close()) return false;
+  const auto older = [&](int32_t n) { return path_ + "." + std::to_string(n); };
+  for (int32_t n = kept_ - 1; n >= 1; --n)
+    std::rename(older(n).c_str(), older(n + 1).c_str());  // may not be there
+  if (kept_ > 0) std::rename(path_.c_str(), older(1).c_str());
+  fd_ = ::open((path_ + ".part").c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (fd_ < 0) {
+    error_ = reason(path_, "be written", errno);
+    return false;
+  }
+  good_bytes_ = 0;
+  return put(header_.data(), header_.size());
 }
 
 bool OutputFile::put(const char* bytes, size_t count) {

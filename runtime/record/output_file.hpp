@@ -30,6 +30,10 @@ class OutputFile {
   /// Closes a stream; throws away a whole file that `close` never finished.
   ~OutputFile();
 
+  /// A stream that would grow beyond `bytes` goes on in a new file: PATH becomes PATH.1, that PATH.2 and so
+  /// on, at most `kept` of them. Each begins with `header`, which the first one has already.
+  void rotate_at(uint64_t bytes, int32_t kept, std::string header = {});
+
   /// Writes one record: all of it is in the file, or none. Unbuffered for streams.
   bool write(std::string_view record);
   bool write(const void* bytes, size_t count);
@@ -43,6 +47,7 @@ class OutputFile {
 
  private:
   OutputFile(std::string path, Kind kind, int fd);
+  bool rotate();
   bool put(const char* bytes, size_t count);
   bool flush();
   void fail(int error_number);
@@ -53,6 +58,9 @@ class OutputFile {
   int fd_ = -1;
   uint64_t good_bytes_ = 0;  ///< end of the last record that is wholly in the file
   std::vector<char> buffer_;
+  uint64_t rotate_at_ = 0;  ///< bytes; 0: never
+  int32_t kept_ = 0;
+  std::string header_;
 };
 
 /// Writes `content` as the whole file `path`. @return empty, or the error

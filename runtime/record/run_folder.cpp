@@ -27,6 +27,10 @@ bool ends_with(std::string_view text, std::string_view end) {
 /// Whether `name` is what a run (or `picture`) leaves in its folder.
 bool of_a_run(std::string_view name) {
   if (ends_with(name, ".part")) name.remove_suffix(5);
+  // A stream that was rotated: NAME.1, NAME.2, ...
+  if (const size_t dot = name.find_last_of('.');
+      dot != name.npos && dot + 1 < name.size() && name.find_first_not_of("0123456789", dot + 1) == name.npos)
+    name = name.substr(0, dot);
   return std::find(kRunNames.begin(), kRunNames.end(), name) != kRunNames.end() || ends_with(name, ".lcm") ||
          ends_with(name, ".png");
 }

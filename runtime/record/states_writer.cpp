@@ -20,6 +20,8 @@ std::string states_header() {
   return header + "\n";
 }
 
+constexpr const char* kTimingHeader = "stamp,prepare_ms,track_ms,mask_ms,refine_ms,integrate_ms,total_ms\n";
+
 }  // namespace
 
 Result<StatesWriter> StatesWriter::create(const std::string& path) {
@@ -31,6 +33,10 @@ Result<StatesWriter> StatesWriter::create(const std::string& path) {
 
 StatesWriter::StatesWriter(OutputFile file) : file_(std::move(file)) {}
 
+void StatesWriter::rotate_at(uint64_t bytes, int32_t kept) {
+  file_.rotate_at(bytes, kept, states_header());
+}
+
 bool StatesWriter::write(const FrameResult& r) {
   std::string line = fmt::format("{},{},{:.4f},{:.4f},{:.4f}", file_stamp(r.stamp), to_string(r.state),
                                  r.p_good, r.inlier_ratio, r.masked_fraction);
@@ -41,12 +47,15 @@ bool StatesWriter::write(const FrameResult& r) {
 Result<TimingWriter> TimingWriter::create(const std::string& path) {
   auto file = OutputFile::create(path, OutputFile::Kind::stream);
   if (!file) return Error{file.error()};
-  if (!file->write("stamp,prepare_ms,track_ms,mask_ms,refine_ms,integrate_ms,total_ms\n"))
-    return Error{file->error()};
+  if (!file->write(kTimingHeader)) return Error{file->error()};
   return TimingWriter(std::move(*file));
 }
 
 TimingWriter::TimingWriter(OutputFile file) : file_(std::move(file)) {}
+
+void TimingWriter::rotate_at(uint64_t bytes, int32_t kept) {
+  file_.rotate_at(bytes, kept, kTimingHeader);
+}
 
 bool TimingWriter::write(const FrameResult& r) {
   const StageTimes& ms = r.ms;

@@ -15,6 +15,8 @@ class StatesWriter {
 
   bool write(const FrameResult& result);
   OutputFile& file() { return file_; }
+  /// As OutputFile::rotate_at.
+  void rotate_at(uint64_t bytes, int32_t kept);
 
  private:
   explicit StatesWriter(OutputFile file);
@@ -29,6 +31,8 @@ class TimingWriter {
 
   bool write(const FrameResult& result);
   OutputFile& file() { return file_; }
+  /// As OutputFile::rotate_at.
+  void rotate_at(uint64_t bytes, int32_t kept);
 
  private:
   explicit TimingWriter(OutputFile file);

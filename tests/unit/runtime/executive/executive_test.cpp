@@ -211,7 +211,7 @@ TEST_F(Executives, WhatIsTooMuchIsShedAndPosesGoOnAtTheCamerasRate) {
   EXPECT_GT(state.deadline_misses, 20u);
   // From then on no frame is left out, every second one is mapped, and poses are fresh.
   const auto shed = std::find_if(notebook.items.begin(), notebook.items.end(),
-                                 [](const RunItem& item) { return item.shed != 0; });
+                                 [](const RunItem& item) { return item.decision.shed != Shed::nothing; });
   ASSERT_GE(notebook.items.end() - shed, 30);
   const auto since = static_cast<size_t>(notebook.items.end() - shed) - 2;  // it has to catch up first
   EXPECT_GE(since, 0.95 * (notebook.items.back().result.sequence - (shed + 2)->result.sequence));

@@ -96,5 +96,23 @@ TEST(OutputFile, BigWholeFileComesOutByteForByte) {
   EXPECT_EQ(read_text(dir.path("big")), content + block);
 }
 
+TEST(OutputFile, AStreamThatIsFullGoesOnInTheNextFile) {
+  const test::TempDir dir;
+  const std::string path = dir.path("states.csv");
+  {
+    auto file = OutputFile::create(path, OutputFile::Kind::stream);
+    ASSERT_TRUE(file) << file.error();
+    ASSERT_TRUE(file->write("head\n"));
+    file->rotate_at(25, 2, "head\n");  // the header and two records
+    for (int i = 0; i < 9; ++i) ASSERT_TRUE(file->write("record " + std::to_string(i) + "\n"));
+    EXPECT_TRUE(file->close());
+  }
+  EXPECT_EQ(read_text(path), "head\nrecord 8\n");
+  EXPECT_EQ(read_text(path + ".1"), "head\nrecord 6\nrecord 7\n");
+  EXPECT_EQ(read_text(path + ".2"), "head\nrecord 4\nrecord 5\n");
+  EXPECT_FALSE(std::filesystem::exists(path + ".3"));
+  EXPECT_FALSE(std::filesystem::exists(path + ".part"));
+}
+
 }  // namespace
 }  // namespace stillmap
