@@ -154,9 +154,9 @@ int run(const std::string& dir, const std::string& source_name, const std::strin
   auto source = open_source(source_name, source_options);
   if (!source) return fail(source.error());
   Config config;
-  config.map.voxel_m = 0.04f;  // a coarse map: quick
-  config.map.truncation_m = 0.16f;
-  config.map.pool_blocks = 2500;
+  config.map.voxel_m = 0.03f;  // a coarse map: quick
+  config.map.truncation_m = 0.12f;
+  config.map.pool_blocks = 700;
   config.track.prior = MotionPrior::odometry;
   config.archive.dir = dir + "/archive";
   config.record.log = config.record.frames = true;
