@@ -43,7 +43,8 @@ struct SourceConfig {
   static void fields(F&& f) {
     using P = SourceConfig;
     f("wait_s", &P::wait_s, -1, 1e9, "s", "ours", "how long to wait for the source to appear; -1: for ever");
-    f("stall_s", &P::stall_s, 0.05, 1e6, "s", "ours", "live: no frame for so long is the fault camera_stalled");
+    f("stall_s", &P::stall_s, 0.05, 1e6, "s", "ours",
+      "live: no frame for so long is the fault camera_stalled");
     f("time_offset_ms", &P::time_offset_ms, -1e4, 1e4, "ms", "ours",
       "added to the colour stamp before pairing");
     f("max_pair_ms", &P::max_pair_ms, 0, 1000, "ms", "ours", "largest distance of the stamps of a pair");
@@ -146,12 +147,13 @@ struct LcmConfig {
   template <class F>
   static void fields(F&& f) {
     using P = LcmConfig;
-    f("commands", &P::commands, 0, 1, "bool", "ours", "obey STILLMAP_COMMAND: anybody on the network can send it");
+    f("commands", &P::commands, 0, 1, "bool", "ours",
+      "obey STILLMAP_COMMAND: anybody on the network can send it");
   }
 };
 
-/// Threads and deadlines. Priorities, CPU sets and locked memory are for live sources and --realtime; what the
-/// system refuses is said and gone without.
+/// Threads and deadlines. Priorities, CPU sets and locked memory are for live sources and --realtime; what
+/// the system refuses is said and gone without.
 struct RuntimeConfig {
   int32_t threads = 2;
   int32_t frame_slots = 6;
@@ -168,14 +170,16 @@ struct RuntimeConfig {
     f("threads", &P::threads, 1, 64, "threads", "ours", "of the CPU engine, the real-time thread included");
     f("frame_slots", &P::frame_slots, 4, 64, "frames", "ours",
       "live: frames in memory, from the camera to the disk; beyond them the newest wins");
-    f("period_ms", &P::period_ms, 0, 1e4, "ms", "ours", "live: the deadline of a frame; 0: the camera's period");
+    f("period_ms", &P::period_ms, 0, 1e4, "ms", "ours",
+      "live: the deadline of a frame; 0: the camera's period");
     f("capture_priority", &P::capture_priority, 0, 99, "SCHED_FIFO", "ours", "live; 0: the usual scheduler");
     f("realtime_priority", &P::realtime_priority, 0, 99, "SCHED_FIFO", "ours",
       "live, of the thread that takes a frame to its pose; 0: the usual scheduler");
     f("publish_priority", &P::publish_priority, 0, 99, "SCHED_FIFO", "ours", "live; 0: the usual scheduler");
     f("realtime_cpus", &P::realtime_cpus, 0, 100, "CPU set", "ours",
       "live, of the thread that takes a frame to its pose: \"0,2-3\"; empty: any");
-    f("other_cpus", &P::other_cpus, 0, 100, "CPU set", "ours", "live, of capture, publish and record; empty: any");
+    f("other_cpus", &P::other_cpus, 0, 100, "CPU set", "ours",
+      "live, of capture, publish and record; empty: any");
     f("lock_memory", &P::lock_memory, 0, 1, "bool", "ours", "live: no page of it is ever on disk");
   }
 };

@@ -22,6 +22,7 @@ int run_program(int argc, char** argv) {
   add_render(app, exit_code);
   add_bench(app, exit_code);
   add_mesh(app, exit_code);
+  add_top(app, exit_code);
   add_memory_plan(app, exit_code);
   add_check_config(app, exit_code);
   add_parts_not_built(app, exit_code);

@@ -87,8 +87,10 @@ void MetricsServer::answer(int caller) {
     status = status_;
   }
   const std::string body = metrics_text(status);
-  send_all(caller, fmt::format("HTTP/1.0 200 OK\r\nContent-Type: text/plain; version=0.0.4\r\nContent-Length: {}\r\n\r\n",
-                               body.size()));
+  send_all(
+      caller,
+      fmt::format("HTTP/1.0 200 OK\r\nContent-Type: text/plain; version=0.0.4\r\nContent-Length: {}\r\n\r\n",
+                  body.size()));
   send_all(caller, body);
 }
 

@@ -12,8 +12,8 @@
 
 namespace stillmap {
 
-/// Serves the newest status as Prometheus text on 127.0.0.1, one caller after the other; a caller that is slow is
-/// dropped after a second.
+/// Serves the newest status as Prometheus text on 127.0.0.1, one caller after the other; a caller that is
+/// slow is dropped after a second.
 /// @thread show: supervisor; the server has its own
 class MetricsServer {
  public:

@@ -11,13 +11,15 @@ namespace {
 
 class Text {
  public:
-  void gauge(const char* name, const char* help, double value) { head(name, help, "gauge").line(name, value); }
+  void gauge(const char* name, const char* help, double value) {
+    head(name, help, "gauge").line(name, value);
+  }
   void counter(const char* name, const char* help, double value) {
     head(name, help, "counter").line(name, value);
   }
   Text& head(const char* name, const char* help, const char* type) {
-    fmt::format_to(std::back_inserter(text_), "# HELP stillmap_{0} {1}\n# TYPE stillmap_{0} {2}\n", name, help,
-                   type);
+    fmt::format_to(std::back_inserter(text_), "# HELP stillmap_{0} {1}\n# TYPE stillmap_{0} {2}\n", name,
+                   help, type);
     return *this;
   }
   void line(const char* name, double value) {
@@ -52,7 +54,8 @@ std::string metrics_text(const StatusMessage& s) {
                                  std::pair{"mask", s.mask_ms}, std::pair{"refine", s.refine_ms},
                                  std::pair{"integrate", s.integrate_ms}, std::pair{"total", s.total_ms}})
     out.labelled("stage_seconds", "stage", name, seconds(ms));
-  out.gauge("inlier_ratio", "of the points that have a value in the map", static_cast<double>(s.inlier_ratio));
+  out.gauge("inlier_ratio", "of the points that have a value in the map",
+            static_cast<double>(s.inlier_ratio));
   out.gauge("masked_fraction", "of the pixels", static_cast<double>(s.masked_fraction));
   out.gauge("pose_good_probability", "that the pose is good", static_cast<double>(s.p_good));
   out.gauge("map_fill_ratio", "of the fullest pool", static_cast<double>(s.map_fill));

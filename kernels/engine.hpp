@@ -23,9 +23,9 @@ struct EngineParams {
   IntegrateParams integrate;
   MapParams map;
   RelocaliseParams relocalise;
-  int32_t threads = 2;  ///< CPU engine: 1..64, the calling thread included
+  int32_t threads = 2;                  ///< CPU engine: 1..64, the calling thread included
   void (*on_worker_start)() = nullptr;  ///< CPU engine: called once by each worker; may be null
-  float fetch_m = 0;    ///< with an archive: so near to the view its groups are wanted back
+  float fetch_m = 0;                    ///< with an archive: so near to the view its groups are wanted back
 };
 
 /// One line of the memory plan.

@@ -3,8 +3,13 @@
 #include <sys/socket.h>
 #include <sys/uio.h>
 
+#include <atomic>
 #include <cerrno>
+#include <condition_variable>
 #include <cstring>
+#include <mutex>
+#include <optional>
+#include <thread>
 
 #include "drivers/lcm/datagram.hpp"
 #include "drivers/lcm/lcm.hpp"
@@ -14,18 +19,49 @@
 namespace stillmap {
 namespace {
 
+/// Keeps a sending socket a member of its own group. Linux holds datagrams of ttl 0 back within the host only
+/// on devices with a member of the group; without one they leave.
+class Membership {
+ public:
+  Membership(const UdpSocket& socket, uint32_t group) : socket_(socket), group_(group) {
+    join();
+    thread_ = std::jthread([this](const std::stop_token& stop) { keep(stop); });
+  }
+
+  bool holds() const { return holds_.load(std::memory_order_relaxed); }
+
+ private:
+  void join() { holds_.store(join_group(socket_, group_), std::memory_order_relaxed); }
+  void keep(const std::stop_token& stop) {
+    std::unique_lock lock(mutex_);
+    while (!stop.stop_requested()) {
+      never_.wait_for(lock, stop, kJoinEvery, [] { return false; });
+      join();
+    }
+  }
+
+  const UdpSocket& socket_;
+  uint32_t group_;
+  std::atomic<bool> holds_{false};
+  std::mutex mutex_;
+  std::condition_variable_any never_;  ///< nothing but the stop wakes it up; allocates when it is made
+  std::jthread thread_;  ///< last: it uses all the others
+};
+
 class LcmBus final : public MessageBus {
  public:
   LcmBus(UdpSocket socket, const UdpmUrl& url) : socket_(std::move(socket)) {
     to_.sin_family = AF_INET;
     to_.sin_port = htons(url.port);
     to_.sin_addr.s_addr = htonl(url.group);
+    if (url.ttl == 0) within_host_.emplace(socket_, url.group);
   }
 
   Status publish(const char* channel, View<const uint8_t> bytes) override {
     const size_t channel_bytes = std::strlen(channel) + 1;
     if (channel_bytes > lcm_wire::kLongestChannel + 1 || bytes.size > kDatagramBytes)
       return Status::out_of_range;
+    if (within_host_ && !within_host_->holds()) return Status::unavailable;
     uint32_t header[2] = {htonl(lcm_wire::kShortMagic), htonl(sequence_++)};
     iovec parts[3] = {{header, sizeof header},
                       {const_cast<char*>(channel), channel_bytes},  // sendmsg writes to none of them
@@ -44,6 +80,7 @@ class LcmBus final : public MessageBus {
   UdpSocket socket_;
   sockaddr_in to_{};
   uint32_t sequence_ = 0;
+  std::optional<Membership> within_host_;  ///< of ttl 0; last: its thread uses the socket
 };
 
 }  // namespace

@@ -24,7 +24,7 @@ inline constexpr char kLcmDefaultUrl[] = "udpm://239.255.76.67:7667?ttl=0";
 std::unique_ptr<MessageCodec> make_lcm_codec();
 
 /// Publishes to `url`, udpm://GROUP:PORT[?ttl=N]. Without a route to the group it opens all the same; every
-/// publish tries anew.
+/// publish tries anew, with ttl 0 from a second after there is a route.
 /// @return kind bad_usage: the URL is none of these; failed: the system gives no socket.  @thread boot
 Result<std::unique_ptr<MessageBus>> open_lcm_bus(const std::string& url);
 

@@ -9,7 +9,6 @@
 #include <cerrno>
 #include <chrono>
 #include <cstring>
-#include <optional>
 
 #include "drivers/lcm/datagram.hpp"
 
@@ -17,7 +16,6 @@ namespace stillmap {
 namespace {
 
 constexpr int kPollMs = 100;
-constexpr std::chrono::seconds kJoinEvery{1};
 
 sockaddr_in address_of(const UdpmUrl& url) {
   sockaddr_in address{};
@@ -56,13 +54,8 @@ LcmListener::LcmListener(UdpSocket socket, const UdpmUrl& url, Handler handler)
   thread_ = std::jthread([this](const std::stop_token& stop) { listen(stop); });
 }
 
-/// Once more costs nothing where the socket is a member already, and makes it one of a network that came or
-/// came back meanwhile.
 void LcmListener::join() {
-  ip_mreqn group{};
-  group.imr_multiaddr.s_addr = htonl(url_.group);
-  const int joined = setsockopt(socket_.descriptor(), IPPROTO_IP, IP_ADD_MEMBERSHIP, &group, sizeof group);
-  connected_.store(joined == 0 || errno == EADDRINUSE, std::memory_order_relaxed);
+  connected_.store(join_group(socket_, url_.group), std::memory_order_relaxed);
 }
 
 void LcmListener::listen(const std::stop_token& stop) {

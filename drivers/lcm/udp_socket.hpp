@@ -2,6 +2,8 @@
 
 #include <unistd.h>
 
+#include <chrono>
+#include <cstdint>
 #include <utility>
 
 namespace stillmap {
@@ -26,5 +28,12 @@ class UdpSocket {
  private:
   int descriptor_ = -1;
 };
+
+/// Makes the socket a member of the group on the device that the host's routes lead to now. Networks come, go
+/// and change: once every `kJoinEvery` keeps up with them, and costs nothing while all is as it was.
+/// @param group IPv4, host byte order
+/// @return false: no route leads there.  @thread any; may wait while the system changes its networks
+bool join_group(const UdpSocket& socket, uint32_t group);
+inline constexpr std::chrono::seconds kJoinEvery{1};
 
 }  // namespace stillmap

@@ -33,8 +33,9 @@ void add_render(CLI::App& app, int& exit_code);
 void add_picture(CLI::App& app, int& exit_code);
 void add_mesh(CLI::App& app, int& exit_code);
 void add_memory_plan(CLI::App& app, int& exit_code);
+void add_top(CLI::App& app, int& exit_code);
 void add_check_config(CLI::App& app, int& exit_code);
-/// replay, top, doctor: their flags parse; calling them says that the part is not in this build.
+/// replay, doctor: their flags parse; calling them says that the part is not in this build.
 void add_parts_not_built(CLI::App& app, int& exit_code);
 
 }  // namespace stillmap

@@ -162,7 +162,8 @@ Result<std::unique_ptr<BlockArchive>> open_archive(const Config& config) {
   return BlockArchive::open(archive_options(config));
 }
 
-/// A copy of the map that was just saved under a name inside the folder of the run. @return the error, or empty
+/// A copy of the map that was just saved under a name inside the folder of the run. @return the error, or
+/// empty
 std::string copy_map(const RunFolder& folder, const std::string& file) {
   std::error_code error;
   const std::string part = folder.path(file) + ".part";

@@ -175,8 +175,7 @@ void RunOutputs::add_truth(const RunItem& item) {
   tell(files_->truth->file().error());
 }
 
-void RunOutputs::add_masks(const RgbdFrame& frame, const FrameResult& result,
-                           ImageView<const uint8_t> mask) {
+void RunOutputs::add_masks(const RgbdFrame& frame, const FrameResult& result, ImageView<const uint8_t> mask) {
   if (!images_ || !record_.masks) return;
   const std::string name = file_stamp(result.stamp) + ".png";
   std::string error = error_of(write_png_grey(files_->folder.path("masks/" + name), mask));

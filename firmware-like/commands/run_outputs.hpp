@@ -52,8 +52,8 @@ class RunOutputs final : public RunRecorder {
   void event(Stamp stamp, const char* name, const std::string& text) { events_.info(stamp, name, text); }
   void fault(Stamp stamp, const char* name, const std::string& text) { events_.fault(stamp, name, text); }
   /// Closes the streams; then mesh and map (within the time, where it is limited), true cloud, report.
-  /// @param saver null: the map is not saved  @param archive null: there is none  @param timeout_s 0 or more: a
-  /// stop was asked for; negative: no limit
+  /// @param saver null: the map is not saved  @param archive null: there is none  @param timeout_s 0 or more:
+  /// a stop was asked for; negative: no limit
   void finish(Engine& engine, const FrameSource& source, const PipelineCounters& counters, MapSaver* saver,
               BlockArchive* archive, double timeout_s);
 

@@ -30,9 +30,9 @@ void Snapshots::take(const FrameResult& result) {
   const ImageView<float> depth_m{depth_m_.data(), k_.height, k_.width, k_.width};
   if (engine_.raycast(cast<float>(result.T_map_cam), k_, depth_m, colour) != Status::ok) return;
   const std::string path = folder_ + "/" + file_stamp(result.stamp);
-  for (const auto& written : {write_png(path + "_colour.png", engine_.colour_image()),
-                              write_png_grey(path + "_mask.png", engine_.mask_image()),
-                              write_png(path + "_map.png", colour)})
+  for (const auto& written :
+       {write_png(path + "_colour.png", engine_.colour_image()),
+        write_png_grey(path + "_mask.png", engine_.mask_image()), write_png(path + "_map.png", colour)})
     if (!written && error_.empty()) error_ = written.error() + "; no further snapshots are written";
 }
 

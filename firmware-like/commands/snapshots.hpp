@@ -10,11 +10,13 @@
 
 namespace stillmap {
 
-/// Keeps some frames of a recording with their mask and with the map seen from their pose, for `stillmap picture`.
+/// Keeps some frames of a recording with their mask and with the map seen from their pose, for `stillmap
+/// picture`.
 /// @thread as FrameObserver
 class Snapshots final : public FrameObserver {
  public:
-  /// @param folder is there  @param frames expected  @param count to be kept: evenly spread, the last frame among them
+  /// @param folder is there  @param frames expected  @param count to be kept: evenly spread, the last frame
+  /// among them
   Snapshots(std::string folder, Engine& engine, const SourceInfo& source, int64_t frames, int32_t count);
 
   void begin(const FrameSource&, const SourceInfo&) override {}

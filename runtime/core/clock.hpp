@@ -11,8 +11,8 @@ int64_t monotonic_ns();
 int64_t wall_ns();
 
 /// Monotonic time as UTC. The offset is measured when it is made and followed slowly, so that stamps neither
-/// jump nor run backwards while the wall clock is disciplined; when the wall clock is set (a step), the offset
-/// follows at once and the step is counted.
+/// jump nor run backwards while the wall clock is disciplined; when the wall clock is set (a step), the
+/// offset follows at once and the step is counted.
 /// @thread to_utc_us: any; follow: one
 class UtcClock {
  public:

@@ -4,9 +4,9 @@
 
 namespace stillmap::heap_guard {
 
-// A program that links this file has the allocator of the C library replaced by one that looks, before it does
-// what it always did, whether the calling thread is armed. C++ and every library go through it. It proves that
-// the real-time threads and the workers of the engine leave the heap alone.
+// A program that links this file has the allocator of the C library replaced by one that looks, before it
+// does what it always did, whether the calling thread is armed. C++ and every library go through it. It
+// proves that the real-time threads and the workers of the engine leave the heap alone.
 
 /// From now on what the calling thread does with the heap is counted. May be nested.
 void arm_this_thread();

@@ -17,12 +17,7 @@ constexpr uint32_t kNotices = 64;                ///< on their way to the log; m
 
 Capture::Capture(FrameSource& source, FrameSlots& slots, FrameMailbox& mailbox, RunState& state,
                  CaptureLimits limits)
-    : source_(source),
-      slots_(slots),
-      mailbox_(mailbox),
-      state_(state),
-      limits_(limits),
-      notices_(kNotices) {}
+    : source_(source), slots_(slots), mailbox_(mailbox), state_(state), limits_(limits), notices_(kNotices) {}
 
 void Capture::run() {
   uint32_t slot = 0;
@@ -68,12 +63,16 @@ bool Capture::deliver(uint32_t slot) {
   ++delivered_;
   if (frame.captured.ns == 0) frame.captured.ns = monotonic_ns();
   const int32_t older = mailbox_.put(slot);
-  if (older != FrameMailbox::kEmpty) {
-    slots_.release(static_cast<uint32_t>(older));
-    state_.frames_dropped.fetch_add(1, std::memory_order_relaxed);
-    state_.faults.raise(Fault::frame_dropped, monotonic_ns());
-  }
+  if (older != FrameMailbox::kEmpty) slots_.release(static_cast<uint32_t>(older));
+  count_dropped((older != FrameMailbox::kEmpty ? 1 : 0) + source_.left_out() - left_out_);
+  left_out_ = source_.left_out();
   return true;
+}
+
+void Capture::count_dropped(uint32_t frames) {
+  if (frames == 0) return;
+  state_.frames_dropped.fetch_add(frames, std::memory_order_relaxed);
+  state_.faults.raise(Fault::frame_dropped, monotonic_ns(), frames);
 }
 
 void Capture::pass_over(const std::string& why) {

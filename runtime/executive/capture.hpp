@@ -15,8 +15,8 @@ struct CaptureLimits {
   uint32_t max_frames = 0;  ///< to be read; 0: no limit
 };
 
-/// Reads a source until it ends and hands over each frame; where nobody takes them, the newest stays. Waits for
-/// a free slot before it reads: with one slot, reading and working alternate and no frame is lost.
+/// Reads a source until it ends and hands over each frame; where nobody takes them, the newest stays. Waits
+/// for a free slot before it reads: with one slot, reading and working alternate and no frame is lost.
 /// @thread run: capture; the others: any
 class Capture {
  public:
@@ -35,6 +35,7 @@ class Capture {
 
  private:
   bool deliver(uint32_t slot);
+  void count_dropped(uint32_t frames);
   void pass_over(const std::string& why);
   bool jumps_back(const RgbdFrame& frame) const { return delivered_ > 0 && frame.depth_stamp <= last_; }
 
@@ -46,6 +47,7 @@ class Capture {
   NoticeQueue notices_;
   Stamp last_;
   uint32_t delivered_ = 0;
+  uint32_t left_out_ = 0;  ///< by the source, as counted
   std::string error_;
   std::atomic<bool> ended_{false};
 };

@@ -18,10 +18,10 @@ constexpr int64_t kSecond_ns = 1'000'000'000;
 constexpr int64_t kStalled_ns = 10 * kSecond_ns;  ///< a thread that gives no sign of life for so long
 constexpr uint32_t kPublishItems = 64, kRecordItems = 256, kNotices = 64;
 /// Faults that are lines of their own where they come up; the others are told by the supervisor.
-constexpr Fault kToldElsewhere[] = {Fault::bad_frame,      Fault::tracking_lost,  Fault::new_map,
-                                    Fault::map_full,       Fault::archive_full,   Fault::archive_failed,
-                                    Fault::record_failed,  Fault::frame_dropped,  Fault::deadline_missed,
-                                    Fault::result_dropped, Fault::work_shed,      Fault::clock_jump,
+constexpr Fault kToldElsewhere[] = {Fault::bad_frame,      Fault::tracking_lost,   Fault::new_map,
+                                    Fault::map_full,       Fault::archive_full,    Fault::archive_failed,
+                                    Fault::record_failed,  Fault::frame_dropped,   Fault::deadline_missed,
+                                    Fault::result_dropped, Fault::work_shed,       Fault::clock_jump,
                                     Fault::thread_stalled, Fault::realtime_refused};
 
 /// Names stay inside the folder of the run.
@@ -58,8 +58,8 @@ Executive::Executive(ExecutiveParts parts, const Config& config, const Executive
       to_record_(kRecordItems),
       notices_(kNotices),
       capture_(p_.source, slots_, mailbox_, p_.state, {options.max_frames}),
-      loop_({p_.engine, p_.pipeline, capture_, slots_, mailbox_, p_.state, to_publish_, to_record_, p_.archive,
-             p_.map_keeper, p_.observers},
+      loop_({p_.engine, p_.pipeline, capture_, slots_, mailbox_, p_.state, to_publish_, to_record_,
+             p_.archive, p_.map_keeper, p_.observers},
             {static_cast<double>(config.lost.new_map_after_s), static_cast<double>(config.runtime.period_ms),
              options.live, options.keep_images}),
       publish_(MessageMaker(config, p_.clock, p_.state, options.T_map_cam), to_publish_, p_.state, p_.codec,
@@ -159,7 +159,8 @@ void Executive::watch_threads(int64_t now_ns) {
       w.beats = beats;
       w.since_ns = now_ns;
     }
-    const bool ended = loop_done_.load(std::memory_order_relaxed) || (capture_.ended() && w.heart == &p_.state.capture);
+    const bool ended =
+        loop_done_.load(std::memory_order_relaxed) || (capture_.ended() && w.heart == &p_.state.capture);
     const bool stalled = !ended && now_ns - w.since_ns > kStalled_ns;
     if (stalled && !w.stalled) {
       p_.state.faults.raise(Fault::thread_stalled, now_ns);
@@ -226,8 +227,7 @@ void Executive::obey(const CommandMessage& command) {
       return answer(CommandResult::done);
     case Command::save_map:
     case Command::save_mesh:
-      if (p_.map_keeper == nullptr || command_ || !good_name(file))
-        return answer(CommandResult::refused);
+      if (p_.map_keeper == nullptr || command_ || !good_name(file)) return answer(CommandResult::refused);
       command_ = command;
       p_.state.saves.store(0, std::memory_order_relaxed);
       p_.state.requests.fetch_or(kSaveMapRequest, std::memory_order_acq_rel);
@@ -265,7 +265,8 @@ void Executive::end_command() {
 }
 
 void Executive::tell(Notice::Kind kind, std::string_view name, const std::string& text) {
-  notices_.push(Notice::make(kind, Stamp{p_.state.last_stamp_ns.load(std::memory_order_relaxed)}, name, text));
+  notices_.push(
+      Notice::make(kind, Stamp{p_.state.last_stamp_ns.load(std::memory_order_relaxed)}, name, text));
 }
 
 }  // namespace stillmap

@@ -67,8 +67,8 @@ class Executive {
  public:
   Executive(ExecutiveParts parts, const Config& config, const ExecutiveOptions& options);
 
-  /// Starts the threads, watches over them until the source ends, the limit is reached or a stop is asked for,
-  /// and ends them. Bad frames are counted and passed over.
+  /// Starts the threads, watches over them until the source ends, the limit is reached or a stop is asked
+  /// for, and ends them. Bad frames are counted and passed over.
   RunEnd run();
 
   const FrameResult& last_result() const { return loop_.last_result(); }

@@ -38,8 +38,7 @@ void FrameLoop::work_on(uint32_t slot) {
   FrameResult result;
   {
     const heap_guard::Scope armed;
-    const FrameWork work =
-        limits_.live ? FrameWork{load_.integrate(), load_.finest_level()} : FrameWork{};
+    const FrameWork work = limits_.live ? FrameWork{load_.integrate(), load_.finest_level()} : FrameWork{};
     result = p_.pipeline.process(frame, work, this);
     if (p_.archive) p_.archive->step(p_.engine, p_.pipeline.centre_map());
     if (limits_.live) count_lateness(result);
@@ -165,8 +164,8 @@ void FrameLoop::hand_on(uint32_t slot, const FrameResult& result) {
   dropped_ = dropped;
   item.counters = p_.pipeline.counters();
   if (p_.archive) item.archive = p_.archive->counters();
-  // Not live, the only slot always goes on and comes back when the frame is on disk: nothing is lost. Live, one
-  // has to stay free for the camera.
+  // Not live, the only slot always goes on and comes back when the frame is on disk: nothing is lost. Live,
+  // one has to stay free for the camera.
   const bool room = p_.slots.in_use() < p_.slots.count();
   const bool with_images = !limits_.live || (limits_.keep_images && room);
   if (with_images) {

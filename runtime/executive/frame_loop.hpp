@@ -25,8 +25,8 @@ struct FrameLoopParts {
   RunState& state;
   PublishQueue& to_publish;
   RunQueue& to_record;
-  BlockArchive* archive = nullptr;    ///< null: far parts of a full map are dropped
-  MapKeeper* map_keeper = nullptr;    ///< null: the map is not saved on the way
+  BlockArchive* archive = nullptr;        ///< null: far parts of a full map are dropped
+  MapKeeper* map_keeper = nullptr;        ///< null: the map is not saved on the way
   std::vector<FrameObserver*> observers;  ///< measuring; they are outside of what real time is asked for
 };
 
@@ -41,8 +41,7 @@ struct FrameLoopLimits {
 /// @thread run: real-time; it does not allocate, lock, touch files, format text or throw (observers aside)
 class FrameLoop final : public PoseListener {
  public:
-  FrameLoop(const FrameLoopParts& parts, const FrameLoopLimits& limits)
-      : p_(parts), limits_(limits) {}
+  FrameLoop(const FrameLoopParts& parts, const FrameLoopLimits& limits) : p_(parts), limits_(limits) {}
 
   /// Until the capture has ended and its last frame is done, or a stop is asked for.
   void run();

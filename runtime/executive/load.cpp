@@ -26,8 +26,7 @@ void LoadShedder::add(double total_ms, bool integrated, double period_ms) {
     return;
   }
   if (since_change_ < patience_) return;
-  const double expected_ms =
-      shed_ == Shed::finest_level ? kFinestShare * mean_ms() : mean_whole_ms();
+  const double expected_ms = shed_ == Shed::finest_level ? kFinestShare * mean_ms() : mean_whole_ms();
   if (expected_ms > kRoom * period_ms) return;
   change(shed_ == Shed::finest_level ? Shed::every_second_integration : Shed::nothing);
   returned_ = true;

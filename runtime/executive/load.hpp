@@ -8,17 +8,18 @@
 namespace stillmap {
 
 /// Decides what is left out while frames take longer than the camera's period (DESIGN section 6). Mean times
-/// are taken over a window of frames, so that a single late frame sheds nothing; what was shed comes back when
-/// the frame would fit again with room to spare, and a return that did not hold is tried again after twice
-/// the time.                                                                               test: load_test
+/// are taken over a window of frames, so that a single late frame sheds nothing; what was shed comes back
+/// when the frame would fit again with room to spare, and a return that did not hold is tried again after
+/// twice the time.                                                                               test:
+/// load_test
 /// @thread real-time; neither waits nor allocates
 class LoadShedder {
  public:
-  static constexpr uint32_t kWindow = 30;       ///< frames
-  static constexpr double kTooMuch = 1.0;       ///< of the period, mean: more is shed
-  static constexpr double kRoom = 0.85;         ///< of the period, what a return may take
-  static constexpr double kFinestShare = 1.6;   ///< time with the finest level over that without, at most
-  static constexpr uint32_t kPatience = 90;     ///< frames before a return
+  static constexpr uint32_t kWindow = 30;      ///< frames
+  static constexpr double kTooMuch = 1.0;      ///< of the period, mean: more is shed
+  static constexpr double kRoom = 0.85;        ///< of the period, what a return may take
+  static constexpr double kFinestShare = 1.6;  ///< time with the finest level over that without, at most
+  static constexpr uint32_t kPatience = 90;    ///< frames before a return
   static constexpr uint32_t kMostPatience = 5400;
 
   Shed shed() const { return shed_; }

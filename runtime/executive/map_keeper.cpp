@@ -24,8 +24,7 @@ bool MapKeeper::due(const FrameResult& result) {
   const bool lost = result.state == TrackingState::lost;
   if (!lost) lost_map_wanted_ = false;
   if (lost && last_state_ != TrackingState::lost) lost_map_wanted_ = config_.lost.new_map_after_s > 0;
-  return asked_ || lost_map_wanted_ ||
-         (!lost && config_.record.map_every_s > 0 && result.stamp >= *due_);
+  return asked_ || lost_map_wanted_ || (!lost && config_.record.map_every_s > 0 && result.stamp >= *due_);
 }
 
 /// How far the save is, once a second; how it ended.

@@ -20,8 +20,8 @@ void transform_covariance(const Se3d& T_to_from, const float (&from)[21], float 
 /// @thread one; does not allocate
 class MessageMaker {
  public:
-  /// @param clock, state outlive this  @param T_map_cam of the first frame: where the body is then, is the origin
-  /// of local, level but for mount.initial_rp_deg
+  /// @param clock, state outlive this  @param T_map_cam of the first frame: where the body is then, is the
+  /// origin of local, level but for mount.initial_rp_deg
   MessageMaker(const Config& config, const UtcClock& clock, const RunState& state, const Se3d& T_map_cam);
 
   PoseMessage pose(const PublishItem& item);
@@ -40,7 +40,7 @@ class MessageMaker {
   Stamp captured_before_;
   uint32_t epoch_before_ = 0;
   bool have_before_ = false;
-  Stamp last_frame_;  ///< captured, of the last status
+  Stamp last_frame_;     ///< captured, of the last status
   double period_s_ = 0;  ///< mean, between processed frames
   StatusMessage last_;
 };

@@ -22,8 +22,8 @@ struct ModeInputs {
   bool source_open = false;  ///< the source is there
   bool frames = false;       ///< at least one was processed
   bool stopping = false;
-  uint8_t state = 2;            ///< TrackingState of the last frame
-  uint64_t faults_active = 0;   ///< bit n: Fault n holds
+  uint8_t state = 2;           ///< TrackingState of the last frame
+  uint64_t faults_active = 0;  ///< bit n: Fault n holds
 };
 
 /// boot until the source is open, ready until its first frame, then by the faults that hold and the tracking

@@ -33,15 +33,15 @@ Status PacedSource::next(RgbdFrame& frame, int32_t timeout_ms) {
   return Status::ok;
 }
 
-/// The next frame is expected a period after the last one; one that is due less than a period ago is still the
-/// newest.
+/// The next frame is expected a period after the last one; one that is due less than a period ago is still
+/// the newest.
 void PacedSource::skip_what_is_late(int64_t now_ns) {
   if (period_ns_ == 0) return;
   const int64_t late_ns = now_ns - (due_ns(last_) + period_ns_);
   if (late_ns < period_ns_) return;
   const auto count = static_cast<uint32_t>(std::min<int64_t>(late_ns / period_ns_, 1000));
   source_.skip(count);
-  skipped_ += count;
+  left_out_ += count;
 }
 
 }  // namespace stillmap

@@ -4,9 +4,9 @@
 
 namespace stillmap {
 
-/// A recording played at the pace of its stamps (--realtime): a frame is there when its time has come, as if a
-/// camera delivered it. Frames whose time has passed by more than a period are skipped without decoding them,
-/// as a camera would have dropped them.
+/// A recording played at the pace of its stamps (--realtime): a frame is there when its time has come, as if
+/// a camera delivered it. Frames whose time has passed by more than a period are skipped without decoding
+/// them, as a camera would have dropped them.
 /// @thread as FrameSource
 class PacedSource final : public FrameSource {
  public:
@@ -21,8 +21,7 @@ class PacedSource final : public FrameSource {
   void skip(uint32_t count) override { source_.skip(count); }
   const std::string& error() const override { return source_.error(); }
 
-  /// Frames that were skipped because their time had passed.
-  uint32_t skipped() const { return skipped_; }
+  uint32_t left_out() const override { return left_out_; }
 
  private:
   int64_t due_ns(Stamp stamp) const { return start_ns_ + (stamp.ns - first_.ns); }
@@ -33,7 +32,7 @@ class PacedSource final : public FrameSource {
   int64_t start_ns_ = 0;  ///< CLOCK_MONOTONIC, of the first frame
   Stamp first_, last_;
   int64_t period_ns_ = 0;  ///< shortest between two frames; 0: not known yet
-  uint32_t skipped_ = 0;
+  uint32_t left_out_ = 0;
 };
 
 }  // namespace stillmap

@@ -52,8 +52,8 @@ template <class Message>
 void PublishStage::send(const char* channel, const Message& message) {
   if (codec_ == nullptr || bus_ == nullptr) return;
   const uint32_t size = codec_->encode(message, View<uint8_t>{bytes_.data(), kDatagramBytes});
-  const Status sent =
-      size == 0 ? Status::capacity_exhausted : bus_->publish(channel, View<const uint8_t>{bytes_.data(), size});
+  const Status sent = size == 0 ? Status::capacity_exhausted
+                                : bus_->publish(channel, View<const uint8_t>{bytes_.data(), size});
   if (sent == Status::ok)
     state_.faults.clear(Fault::bus_unavailable);
   else

@@ -10,7 +10,6 @@
 
 namespace stillmap {
 
-
 /// The newest value, from one thread to another; neither waits for the other.
 template <class T>
 class Latest {
@@ -38,7 +37,8 @@ class Latest {
 /// @thread run: publish; it does not allocate, lock or throw. latest: supervisor
 class PublishStage {
  public:
-  /// @param codec, bus null: nothing is sent, the status is made all the same  @param queue, state outlive this
+  /// @param codec, bus null: nothing is sent, the status is made all the same  @param queue, state outlive
+  /// this
   PublishStage(MessageMaker maker, PublishQueue& queue, RunState& state, const MessageCodec* codec,
                MessageBus* bus)
       : maker_(maker), queue_(queue), state_(state), codec_(codec), bus_(bus) {}

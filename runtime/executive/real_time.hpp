@@ -11,9 +11,9 @@ namespace stillmap {
 
 /// How a thread runs.
 struct ThreadPlan {
-  const char* name;          ///< at most 15 characters: as `top -H` shows it
+  const char* name;           ///< at most 15 characters: as `top -H` shows it
   int32_t fifo_priority = 0;  ///< SCHED_FIFO 1..99; 0: the usual scheduler
-  std::string cpus;          ///< "0,2-3"; empty: any
+  std::string cpus;           ///< "0,2-3"; empty: any
 };
 
 /// Applies the plan to the calling thread and touches `stack_bytes` of its stack, so that no page of it is

@@ -18,10 +18,10 @@ struct RunEvent {
   enum class Kind : uint8_t { none, new_map, map_save_progress, map_saved, map_save_failed, reset };
   Kind kind = Kind::none;
   Stamp stamp;
-  double seconds = 0;      ///< new_map: lost for; map_saved: it took
-  uint64_t done = 0;       ///< groups copied; map_saved: bytes of the file
-  uint64_t of = 0;         ///< groups of the map
-  char text[240] = {};     ///< map_save_failed: why
+  double seconds = 0;   ///< new_map: lost for; map_saved: it took
+  uint64_t done = 0;    ///< groups copied; map_saved: bytes of the file
+  uint64_t of = 0;      ///< groups of the map
+  char text[240] = {};  ///< map_save_failed: why
 
   void set_text(const char* from) { std::strncpy(text, from, sizeof(text) - 1); }
 };

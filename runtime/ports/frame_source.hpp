@@ -72,6 +72,9 @@ class FrameSource {
   /// Passes over `count` frames without decoding them.
   virtual void skip(uint32_t count) = 0;
 
+  /// Frames that it left out by itself because nobody took them in time, since the start.
+  virtual uint32_t left_out() const { return 0; }
+
   /// One line: which file, what was expected, what to do.
   virtual const std::string& error() const = 0;
 };

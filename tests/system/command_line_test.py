@@ -129,7 +129,7 @@ class Usage(Case):
                           ["run", "--source", SMALL, "--realtime"],
                           ["run", "--source", SMALL, "--set", "record.log=true"],
                           ["run", "--source", "xtion"],
-                          ["replay", "a.lcm"], ["top"], ["doctor"],
+                          ["replay", "a.lcm"], ["doctor"],
                           ["bench", "soak"]]:
             done = self.refused(2, *arguments)
             self.assertIn("build", done.stderr, arguments)

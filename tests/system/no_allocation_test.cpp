@@ -1,13 +1,11 @@
-// The real-time loop and the workers of the engine do not allocate: operator new is counted by the heap
-// guard, and the C allocators are hooked here, in every thread.
+// The real-time loop and the workers of the engine leave the heap alone.
 
 #include <gtest/gtest.h>
-#include <malloc.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -15,77 +13,73 @@
 #include <thread>
 
 #include "config/engine_params.hpp"
+#include "drivers/lcm/lcm.hpp"
 #include "drivers/registry.hpp"
 #include "runtime/archive/block_archive.hpp"
 #include "runtime/archive/map_saver.hpp"
 #include "runtime/core/heap_guard.hpp"
 #include "runtime/pipeline/pipeline.hpp"
 #include "tests/support/frame_memory.hpp"
+#include "tests/support/private_network.hpp"
+#include "tests/support/sample_messages.hpp"
 #include "tests/support/temp_dir.hpp"
-
-extern "C" {
-void* __libc_malloc(size_t);
-void* __libc_calloc(size_t, size_t);
-void* __libc_realloc(void*, size_t);
-void* __libc_memalign(size_t, size_t);
-
-void* malloc(size_t bytes) {
-  stillmap::heap_guard::note();
-  return __libc_malloc(bytes);
-}
-void* calloc(size_t count, size_t bytes) {
-  stillmap::heap_guard::note();
-  return __libc_calloc(count, bytes);
-}
-void* realloc(void* memory, size_t bytes) {
-  stillmap::heap_guard::note();
-  return __libc_realloc(memory, bytes);
-}
-void* aligned_alloc(size_t alignment, size_t bytes) {
-  stillmap::heap_guard::note();
-  return __libc_memalign(alignment, bytes);
-}
-void* memalign(size_t alignment, size_t bytes) {
-  stillmap::heap_guard::note();
-  return __libc_memalign(alignment, bytes);
-}
-int posix_memalign(void** memory, size_t alignment, size_t bytes) {
-  stillmap::heap_guard::note();
-  *memory = __libc_memalign(alignment, bytes);
-  return *memory == nullptr ? ENOMEM : 0;
-}
-}
 
 namespace stillmap {
 namespace {
 
-/// Allocations that `work` makes, in any thread.
+/// Heap calls that `work` makes in this thread, and in those that are armed by themselves.
 template <class Work>
 uint64_t allocations_of(Work work) {
   const uint64_t before = heap_guard::allocations();
-  heap_guard::arm();
+  const heap_guard::Scope armed;
   work();
-  heap_guard::disarm();
   return heap_guard::allocations() - before;
 }
 
-TEST(HeapGuard, SeesEveryWayToAllocateInEveryThread) {
+TEST(HeapGuard, SeesEveryWayToUseTheHeap) {
   void* volatile kept = nullptr;  // keeps the compiler from leaving the allocation out
-  EXPECT_GE(allocations_of([&] { kept = ::operator new(10); }), 1u);
-  ::operator delete(kept);
-  EXPECT_GE(allocations_of([&] { kept = std::malloc(10); }), 1u);
+  EXPECT_EQ(allocations_of([&] { kept = ::operator new(10); }), 1u);
+  EXPECT_EQ(allocations_of([&] { ::operator delete(kept); }), 1u);
+  EXPECT_EQ(allocations_of([&] { kept = std::malloc(10); }), 1u);
+  EXPECT_EQ(allocations_of([&] { kept = std::realloc(kept, 1000); }), 1u);
+  EXPECT_EQ(allocations_of([&] { std::free(kept); }), 1u);
+  EXPECT_EQ(allocations_of([&] { kept = std::calloc(1, 10); }), 1u);
   std::free(kept);
-  EXPECT_GE(allocations_of([&] { kept = std::calloc(1, 10); }), 1u);
-  EXPECT_GE(allocations_of([&] { kept = std::realloc(kept, 1000); }), 1u);
+  EXPECT_EQ(allocations_of([&] { kept = std::aligned_alloc(64, 64); }), 1u);
   std::free(kept);
-  EXPECT_GE(allocations_of([&] { kept = std::aligned_alloc(64, 64); }), 1u);
+  EXPECT_EQ(allocations_of([] {}), 0u);
+}
+
+TEST(HeapGuard, SeesWhatALibraryAllocates) {
+  char* volatile kept = nullptr;
+  EXPECT_GE(allocations_of([&] { kept = ::strdup("a text"); }), 1u);
   std::free(kept);
-  uint64_t in_thread = 0;
-  std::thread worker([&] { in_thread = allocations_of([&] { kept = std::malloc(10); }); });
+}
+
+TEST(HeapGuard, CountsArmedThreadsOnly) {
+  void* volatile kept = nullptr;
+  uint64_t armed = 0, others = 0;
+  std::thread worker([&] { armed = allocations_of([&] { kept = std::malloc(10); }); });
   worker.join();
   std::free(kept);
-  EXPECT_GE(in_thread, 1u);
-  EXPECT_EQ(allocations_of([] {}), 0u);
+  EXPECT_EQ(armed, 1u);
+  const uint64_t before = heap_guard::allocations();
+  std::thread other([&] { kept = std::malloc(10); });
+  other.join();
+  others = heap_guard::allocations() - before;
+  std::free(kept);
+  EXPECT_EQ(others, 0u);
+}
+
+TEST(HeapGuard, WhereItIsFatalItSaysWhereTheCallCameFrom) {
+  EXPECT_DEATH(
+      {
+        heap_guard::make_fatal();
+        const heap_guard::Scope armed;
+        void* volatile kept = std::malloc(10);
+        std::free(kept);
+      },
+      "a real-time thread used the heap, from");
 }
 
 /// A pipeline and the frames of a source for it.
@@ -96,7 +90,9 @@ class RealTimeLoop : public testing::Test {
     ASSERT_TRUE(opened) << opened.error();
     source_ = std::move(*opened);
     const SourceInfo& info = source_->info();
-    engine_ = make_cpu_engine(engine_params(config, info.camera, info.depth_units_per_m));
+    EngineParams params = engine_params(config, info.camera, info.depth_units_per_m);
+    params.on_worker_start = heap_guard::arm_this_thread;
+    engine_ = make_cpu_engine(params);
     ASSERT_NE(engine_, nullptr);
     memory_.emplace(info);
     pipeline_.emplace(*engine_, config);
@@ -200,6 +196,38 @@ TEST_F(RealTimeLoop, DoesNotAllocateWhileLostAndFindingItselfAgain) {
   EXPECT_EQ(allocations_, 0u);
   EXPECT_GE(pipeline_->counters().lost_frames, 3u);
   EXPECT_EQ(pipeline_->counters().relocalised, 1u);
+}
+
+// Of all threads: whoever publishes, the listeners' own, and whoever asks for odometry and commands.
+TEST(LcmFace, DoesNotAllocateOnceItIsOpen) {
+  if (PrivateNetwork::enter()) PrivateNetwork::add_multicast_route();
+  const auto codec = make_lcm_codec();
+  auto bus = open_lcm_bus(kLcmDefaultUrl);
+  auto commands = open_lcm_commands(kLcmDefaultUrl);
+  auto odometry = open_lcm_odometry(kLcmDefaultUrl, [](Utime utime) { return Stamp{utime.us * 1000}; });
+  ASSERT_TRUE(bus && commands && odometry);
+  uint8_t bytes[kDatagramBytes];
+  uint32_t heard = 0;
+  const auto send = [&](const char* channel, const auto& message) {
+    return (*bus)->publish(channel, {bytes, codec->encode(message, {bytes, kDatagramBytes})});
+  };
+  PoseMessage pose = samples::pose();
+  Status sent = Status::ok;
+  EXPECT_EQ(allocations_of([&] {
+              for (int i = 0; i < 1000; ++i) {
+                pose.utime.us += 1000;
+                sent = send(kPoseChannel, pose);
+                send(kStatusChannel, samples::status());
+                send(kCommandChannel, samples::command());
+                send(kOdometryChannel, pose);
+                CommandMessage command;
+                OdometrySample sample;
+                heard += (*commands)->next(command) == Status::ok;
+                heard += (*odometry)->at({pose.utime.us * 1000}, sample) == Status::ok;
+              }
+            }),
+            0u);
+  EXPECT_TRUE(sent == Status::unavailable || heard > 100u) << heard;  // hosts without multicast hear nothing
 }
 
 }  // namespace

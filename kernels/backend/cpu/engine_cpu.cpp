@@ -198,7 +198,8 @@ class CpuEngine final : public Engine {
   TrackResult track(const Se3& T_world_cam_start, const PosePrior& prior) override;
   MaskResult mask(const Se3& T_world_cam) override;
   TrackResult refine(const Se3& T_world_cam_start, const PosePrior& prior) override {
-    return register_to_map(T_world_cam_start, memory_.trust, {params_.track.levels - 1, finest_level_}, prior);
+    return register_to_map(T_world_cam_start, memory_.trust, {params_.track.levels - 1, finest_level_},
+                           prior);
   }
   void limit_finest_level(int32_t level) override {
     finest_level_ = std::clamp(level, 0, params_.track.levels - 1);
@@ -393,8 +394,9 @@ void set_kernel(const EngineParams& params, int32_t step, TrackWeights& weights)
 }
 
 TrackResult CpuEngine::track(const Se3& T_start, const PosePrior& prior) {
-  const LevelRange levels = {params_.track.levels - 1,
-                             std::min(std::max(params_.track.first_finest_level, finest_level_), params_.track.levels - 1)};
+  const LevelRange levels = {
+      params_.track.levels - 1,
+      std::min(std::max(params_.track.first_finest_level, finest_level_), params_.track.levels - 1)};
   if (!by_parts()) return register_to_map(T_start, {}, levels, prior);
   if (params_.mask.warp)
     carry_mask(memory_.before.depth_m, memory_.before.dynamic, inverse(T_start) * T_before_, memory_.cells);

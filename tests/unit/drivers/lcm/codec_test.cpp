@@ -329,8 +329,13 @@ TEST(LcmCodec, ReadsAnythingWithoutHarm) {
                                      encoded(samples::range()),   encoded(samples::command()),
                                      encoded(samples::frame()),   encoded(samples::decision()),
                                      encoded(samples::session()), encoded(samples::event())};
+#ifdef __SANITIZE_THREAD__  // slow there, and nothing is shared
+  const int inputs = 10'000;
+#else
+  const int inputs = 1'000'000;
+#endif
   int accepted = 0;
-  for (int input = 0; input < 1'000'000 && !HasFailure(); ++input) {
+  for (int input = 0; input < inputs && !HasFailure(); ++input) {
     const size_t kind = below(good.size());
     Bytes bytes = good[kind];
     for (size_t damage = below(4); damage > 0; --damage) {
@@ -371,8 +376,8 @@ TEST(LcmCodec, ReadsAnythingWithoutHarm) {
         break;
     }
   }
-  EXPECT_GT(accepted, 250'000);  // the undamaged quarter
-  EXPECT_LT(accepted, 750'000);
+  EXPECT_GT(accepted, inputs / 4);  // the undamaged quarter
+  EXPECT_LT(accepted, inputs / 4 * 3);
 }
 
 }  // namespace

@@ -5,7 +5,7 @@
 namespace stillmap {
 namespace {
 
-constexpr double kPeriod_ms = 33.3;
+constexpr double kCamera_ms = 33.3;
 
 /// Frames that take `whole_ms` with everything, `rest_ms` without integration, `coarse_ms` without the finest
 /// level either.
@@ -18,7 +18,7 @@ void run(LoadShedder& load, const Machine& m, int frames) {
     const bool integrated = load.integrate();
     double ms = integrated ? m.whole_ms : m.rest_ms;
     if (load.finest_level() > 0) ms -= m.rest_ms - m.coarse_ms;
-    load.add(ms, integrated, kPeriod_ms);
+    load.add(ms, integrated, kCamera_ms);
   }
 }
 
@@ -31,7 +31,7 @@ TEST(LoadShedder, FramesThatFitShedNothing) {
 TEST(LoadShedder, ASingleLateFrameShedsNothing) {
   LoadShedder load;
   run(load, {20, 15, 10}, 40);
-  load.add(150, true, kPeriod_ms);
+  load.add(150, true, kCamera_ms);
   run(load, {20, 15, 10}, 100);
   EXPECT_EQ(load.shed(), Shed::nothing);
 }
@@ -51,7 +51,7 @@ TEST(LoadShedder, EverySecondFrameIsMappedWhileIntegrationIsShed) {
   int mapped = 0;
   for (int i = 0; i < 100; ++i) {
     mapped += load.integrate();
-    load.add(30, load.integrate(), kPeriod_ms);
+    load.add(30, load.integrate(), kCamera_ms);
   }
   EXPECT_EQ(mapped, 50);
 }
@@ -67,9 +67,9 @@ TEST(LoadShedder, WhatWasShedComesBackWhenThereIsRoom) {
   LoadShedder load;
   run(load, {60, 35, 20}, 120);
   ASSERT_EQ(load.shed(), Shed::finest_level);
-  run(load, {20, 12, 8}, LoadShedder::kPatience + LoadShedder::kWindow);
+  run(load, {20, 12, 8}, LoadShedder::kPatience);
   EXPECT_EQ(load.shed(), Shed::every_second_integration);
-  run(load, {20, 12, 8}, LoadShedder::kPatience + LoadShedder::kWindow);
+  run(load, {20, 12, 8}, LoadShedder::kPatience);
   EXPECT_EQ(load.shed(), Shed::nothing);
 }
 

@@ -99,8 +99,8 @@ TEST(Covariance, MovesWithTheAxes) {
   // A turn by 90 degrees about z, and 2 m along x: the uncertainty of yaw becomes one along y as well.
   const Se3d T{exp(Twistd{{}, {0, 0, 90 * kRad}}).rotation, {2, 0, 0}};
   float from[21] = {}, to[21];
-  from[0] = 4;    // x x
-  from[20] = 1;   // rz rz
+  from[0] = 4;   // x x
+  from[20] = 1;  // rz rz
   transform_covariance(T, from, to);
   EXPECT_NEAR(to[0], 0, 1e-5);      // x x: what was y y
   EXPECT_NEAR(to[6], 4 + 4, 1e-5);  // y y: what was x x, and the arm of 2 m

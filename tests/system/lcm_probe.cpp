@@ -1,0 +1,161 @@
+// The other ends of the network for lcm_test.py. Says "ready" once it listens or is about to publish, and
+// what it saw when it is done.
+//
+//   lcm_probe publish URL COUNT HZ    our codec and bus: a status and a pose each; pose n is at x = n
+//   lcm_probe bot-core URL            LCM's library and bot_core.pose_t alone
+//   lcm_probe commands URL            our subscriber
+//   lcm_probe odometry URL            our subscriber
+//
+// Listeners end when their standard input does and nothing has come for a while.
+
+#include <lcm/lcm.h>
+#include <poll.h>
+
+#include <algorithm>
+#include <bot_core/pose_t.hpp>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <set>
+#include <string>
+#include <thread>
+
+#include "drivers/lcm/lcm.hpp"
+#include "tests/support/sample_messages.hpp"
+
+namespace stillmap {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+void say_ready() {
+  std::puts("ready");
+  std::fflush(stdout);
+}
+
+/// Goes on as long as standard input is open, and then until nothing came for a while.
+class Patience {
+ public:
+  bool goes_on() {
+    pollfd input{0, POLLIN, 0};
+    if (poll(&input, 1, 0) == 0) something_came();
+    return seconds_since(last_) < kWhileS;
+  }
+  void something_came() { last_ = Clock::now(); }
+
+ private:
+  static constexpr double kWhileS = 0.3;
+  Clock::time_point last_ = Clock::now();
+};
+
+int publish(const std::string& url, int count, double hz) {
+  const auto bus = open_lcm_bus(url);
+  if (!bus) return std::fprintf(stderr, "%s\n", bus.error().c_str()), 1;
+  const auto codec = make_lcm_codec();
+  uint8_t bytes[kDatagramBytes];
+  int sent = 0, unavailable = 0;
+  double longest_s = 0;
+  const auto send = [&](const char* channel, const auto& message) {
+    const auto start = Clock::now();
+    const Status status = (*bus)->publish(channel, {bytes, codec->encode(message, {bytes, kDatagramBytes})});
+    longest_s = std::max(longest_s, seconds_since(start));
+    ++(status == Status::ok ? sent : unavailable);
+  };
+  say_ready();
+  const auto start = Clock::now();
+  for (int i = 0; i < count; ++i) {
+    PoseMessage pose = samples::pose();
+    pose.pos_m[0] = i;
+    send(kPoseChannel, pose);
+    send(kStatusChannel, samples::status());
+    std::this_thread::sleep_until(start + std::chrono::duration<double>((i + 1) / hz));
+  }
+  std::printf("sent %d unavailable %d longest_ms %.0f\n", sent, unavailable, 1e3 * longest_s);
+  return 0;
+}
+
+/// Poses that LCM's library delivered.
+struct Poses {
+  std::set<int> places;
+  int wrong = 0;
+
+  static void hear(const lcm_recv_buf_t* buffer, const char*, void* self) {
+    auto& poses = *static_cast<Poses*>(self);
+    bot_core::pose_t pose{};
+    const bool read = pose.decode(buffer->data, 0, static_cast<int>(buffer->data_size)) ==
+                      static_cast<int>(buffer->data_size);
+    const PoseMessage sent = samples::pose();
+    if (read && pose.utime == sent.utime.us &&
+        std::equal(pose.orientation, pose.orientation + 4, sent.orientation_wxyz))
+      poses.places.insert(static_cast<int>(pose.pos[0]));
+    else
+      ++poses.wrong;
+  }
+};
+
+int hear_bot_core(const std::string& url) {
+  lcm_t* lcm = lcm_create(url.c_str());
+  if (!lcm) return 1;
+  Poses poses;
+  lcm_subscribe(lcm, kPoseChannel, Poses::hear, &poses);
+  say_ready();
+  for (Patience patience; patience.goes_on();)
+    if (lcm_handle_timeout(lcm, 50) > 0) patience.something_came();
+  lcm_destroy(lcm);
+  std::printf("poses %zu first %d last %d wrong %d\n", poses.places.size(),
+              poses.places.empty() ? -1 : *poses.places.begin(),
+              poses.places.empty() ? -1 : *poses.places.rbegin(), poses.wrong);
+  return 0;
+}
+
+int hear_commands(const std::string& url) {
+  const auto commands = open_lcm_commands(url);
+  if (!commands) return std::fprintf(stderr, "%s\n", commands.error().c_str()), 1;
+  say_ready();
+  for (Patience patience; patience.goes_on(); std::this_thread::sleep_for(std::chrono::milliseconds(5))) {
+    CommandMessage command;
+    while ((*commands)->next(command) == Status::ok) {
+      std::printf("command %u kind %d file '%s'\n", command.id, static_cast<int>(command.command),
+                  command.file.data());
+      std::fflush(stdout);
+      patience.something_came();
+    }
+  }
+  std::printf("refused %u\n", (*commands)->refused());
+  return 0;
+}
+
+int hear_odometry(const std::string& url) {
+  const auto odometry = open_lcm_odometry(url, [](Utime utime) { return Stamp{1000 * utime.us}; });
+  if (!odometry) return std::fprintf(stderr, "%s\n", odometry.error().c_str()), 1;
+  say_ready();
+  OdometrySample sample;
+  const Stamp far_ahead{int64_t{1} << 62};
+  bool any = false;
+  for (Patience patience; patience.goes_on(); std::this_thread::sleep_for(std::chrono::milliseconds(5)))
+    any = (*odometry)->at(far_ahead, sample) == Status::ok || any;
+  std::printf("%s x %.3f refused %u\n", any ? "odometry" : "none", sample.T_odom_body.translation.x,
+              (*odometry)->refused());
+  return 0;
+}
+
+int probe(int argc, char** argv) {
+  const std::string mode = argc > 1 ? argv[1] : "";
+  if (argc == 5 && mode == "publish") return publish(argv[2], std::atoi(argv[3]), std::atof(argv[4]));
+  if (argc == 3 && mode == "bot-core") return hear_bot_core(argv[2]);
+  if (argc == 3 && mode == "commands") return hear_commands(argv[2]);
+  if (argc == 3 && mode == "odometry") return hear_odometry(argv[2]);
+  std::fputs("lcm_probe publish|bot-core|commands|odometry URL ...\n", stderr);
+  return 2;
+}
+
+}  // namespace
+}  // namespace stillmap
+
+int main(int argc, char** argv) {
+  return stillmap::probe(argc, argv);
+}
