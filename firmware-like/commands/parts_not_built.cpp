@@ -28,8 +28,6 @@ void add(CLI::App& app, int& exit_code, const char* name, const char* help, cons
 void add_parts_not_built(CLI::App& app, int& exit_code) {
   add(app, exit_code, "replay", "a recorded event log once more",
       {{"LOG", "*.lcm of a run", true}, {"--out", "folder"}});
-  add(app, exit_code, "doctor", "what this machine lacks",
-      {{"--config", "TOML file"}, {"--source", "source"}});
 }
 
 }  // namespace stillmap

@@ -135,6 +135,12 @@ struct Route {
 
 constexpr uint32_t kLcmGroup = 0x434CFFEF;  // 239.255.76.67
 
+/// "0x1003" of /sys
+uint64_t net_flags(const Machine& machine, const std::string& device) {
+  const std::string text = machine.line("/sys/class/net/" + device + "/flags");
+  return text.starts_with("0x") ? number(text.substr(2), 16) : 0;
+}
+
 std::optional<Route> route_of_lcm(const Machine& machine) {
   std::istringstream in(machine.text("/proc/net/route"));
   std::string heading;
@@ -295,8 +301,7 @@ Findings check_lcm(const Machine& machine) {
   constexpr const char* kOwnHost = "sudo ip link set lo multicast on && sudo ip route add 224.0.0.0/4 dev lo";
   if (!route)
     found.push_back(worse("lcm route", "no route to 239.255.76.67: no poses leave over LCM", kOwnHost));
-  else if ((number(machine.line("/sys/class/net/" + route->device + "/flags").substr(2), 16) & kMulticast) ==
-           0)
+  else if ((net_flags(machine, route->device) & kMulticast) == 0)
     found.push_back(worse("lcm route",
                           route->device + " leads to 239.255.76.67 but has multicast switched off",
                           "sudo ip link set " + route->device + " multicast on"));
@@ -329,12 +334,11 @@ Findings check_disks(const Machine& machine, const RunIntent& intent) {
   return found;
 }
 
-Findings check_machine(const Machine& machine, const RunIntent& intent) {
+Findings check_system(const Machine& machine, const RunIntent& intent) {
   Findings all;
   const auto add = [&all](Findings some) {
     all.insert(all.end(), std::move_iterator(some.begin()), std::move_iterator(some.end()));
   };
-  add(check_cameras(machine, intent));
   add(check_memory(machine, intent));
   add(check_real_time(machine, intent));
   add(check_processors(machine, intent));

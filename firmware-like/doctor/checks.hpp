@@ -50,8 +50,8 @@ Findings check_clock(const Machine& machine);
 /// Folders of the run and of the archive: can be written, with room.
 Findings check_disks(const Machine& machine, const RunIntent& intent);
 
-/// All of the above, in this order.  @thread boot; test: checks_test
-Findings check_machine(const Machine& machine, const RunIntent& intent);
+/// All but the cameras, in this order.  @thread boot; test: checks_test
+Findings check_system(const Machine& machine, const RunIntent& intent);
 
 /// "OK     camera     ..." and, where something is wrong, what mends it on a line of its own.
 std::string to_text(const Findings& findings);

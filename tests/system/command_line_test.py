@@ -129,10 +129,26 @@ class Usage(Case):
                           ["run", "--source", SMALL, "--realtime"],
                           ["run", "--source", SMALL, "--set", "record.log=true"],
                           ["run", "--source", "xtion"],
-                          ["replay", "a.lcm"], ["doctor"],
+                          ["replay", "a.lcm"],
                           ["bench", "soak"]]:
             done = self.refused(2, *arguments)
             self.assertIn("build", done.stderr, arguments)
+
+    def test_doctor(self):
+        done = stillmap("doctor", "--source", SMALL, "--out", self.out)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        for part in ["configuration", "source", "memory", "priority", "processors", "cuda", "lcm route", "lcm buffers",
+                     "clock", "out"]:
+            self.assertRegex(done.stdout, rf"(?m)^(OK|worse) +{part} ")
+        self.assertNotIn("WRONG", done.stdout)
+        self.assertFalse(self.out.exists(), "it only looks")
+        for arguments, part in [(["--source", "v4l2:/dev/video98,/dev/video99"], "camera"),
+                                (["--source", f"tum:{self.folder}/none"], "source"),
+                                (["--set", "track.levels=9"], "configuration"),
+                                (["--out", "/proc/no"], "out")]:
+            done = stillmap("doctor", *arguments)
+            self.assertEqual(done.returncode, 1, done.stdout + done.stderr)
+            self.assertRegex(done.stdout, rf"(?m)^WRONG +{part} .*\n(.*\n)* +mend: .")
 
     def test_configuration(self):
         config = self.folder / "c.toml"
