@@ -1,3 +1,5 @@
+# A package is made of what was built.
+set(CMAKE_SKIP_INSTALL_ALL_DEPENDENCY ON)
 # cmake --install: the program with presets and documents (component program, anywhere), and what makes it a service of this
 # machine (component service: systemd unit, udev rule, user, /etc/stillmap). cpack -G DEB: all of it as a package.
 set(documents ${CMAKE_INSTALL_DATADIR}/doc/stillmap)

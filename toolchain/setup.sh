@@ -10,7 +10,7 @@ packages=(
   libeigen3-dev libfmt-dev libcli11-dev nlohmann-json3-dev libtomlplusplus-dev libnanoflann-dev
   libspng-dev libsystemd-dev libturbojpeg0-dev libzstd-dev libcairo2-dev fonts-dejavu-core
   liblcm-dev liblcm-bin libglib2.0-dev iproute2
-  libgtest-dev libbenchmark-dev valgrind
+  libgtest-dev libbenchmark-dev systemd valgrind
 )
 if [[ "${1:-}" == --lint ]]; then
   packages+=(clang-14 clang-format-14 clang-tidy-14)

@@ -171,6 +171,8 @@ std::string existing_part(const Machine& machine, const std::string& folder) {
 Finding check_folder(const Machine& machine, const char* part, const std::string& folder,
                      uint64_t wanted_bytes) {
   const std::string there = existing_part(machine, folder);
+  if (!machine.is_folder(there))
+    return wrong(part, there + " is no folder", "remove it, or choose another folder than " + folder);
   if (!machine.may_use(machine.root + there))
     return wrong(part, there + " cannot be written by this user",
                  fmt::format("sudo mkdir -p {0} && sudo chown $USER {0}", folder));

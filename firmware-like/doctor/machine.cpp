@@ -53,6 +53,11 @@ bool Machine::exists(const std::string& path) const {
   return std::filesystem::exists(root + path, error);
 }
 
+bool Machine::is_folder(const std::string& path) const {
+  std::error_code error;
+  return std::filesystem::is_directory(root + path, error);
+}
+
 std::vector<std::string> Machine::list(const std::string& folder) const {
   std::vector<std::string> paths;
   std::error_code error;

@@ -25,6 +25,7 @@ struct Machine {
   /// All of a file, at most a megabyte.
   std::string text(const std::string& path) const;
   bool exists(const std::string& path) const;
+  bool is_folder(const std::string& path) const;
   /// Full paths (without `root`) of what is in a folder, sorted; empty where there is no such folder.
   std::vector<std::string> list(const std::string& folder) const;
 };

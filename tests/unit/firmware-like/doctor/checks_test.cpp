@@ -223,9 +223,12 @@ TEST_F(Doctor, Disks) {
   intent.config.archive.dir = "/var/lib/stillmap/archive";
   expect_only(Verdict::worse, "archive.dir", "4000 MB may be wanted", "df /");
   free_bytes = 100'000 * kMegabyte;
+  write("/var", "");
+  intent.config.archive.dir.clear();
+  expect_only(Verdict::wrong, "out", "/var is no folder", "remove it");
+  remove("/var");
   std::filesystem::create_directories(machine.root + "/var/lib");
   forbidden = machine.root + "/var/lib";
-  intent.config.archive.dir.clear();
   expect_only(Verdict::wrong, "out", "/var/lib cannot be written", "sudo mkdir -p /var/lib/stillmap/run");
 }
 
