@@ -26,7 +26,7 @@ int run_program(int argc, char** argv) {
   add_memory_plan(app, exit_code);
   add_check_config(app, exit_code);
   add_replay(app, exit_code);
-  add_parts_not_built(app, exit_code);
+  add_doctor(app, exit_code);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

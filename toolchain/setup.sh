@@ -2,6 +2,7 @@
 # Installs what Stillmap needs from the distribution's packages (Debian 12, Ubuntu 22.04 and 24.04).
 # Does nothing, in well under a second, when all of it is there.
 #   setup.sh           what building, testing and running need
+#   setup.sh --cross   also compiler and emulator for 64-bit ARM (toolchain/cross_build.sh)
 #   setup.sh --lint    also clang, clang-format and clang-tidy, in the version that all three distributions have
 set -euo pipefail
 
@@ -10,12 +11,14 @@ packages=(
   libeigen3-dev libfmt-dev libcli11-dev nlohmann-json3-dev libtomlplusplus-dev libnanoflann-dev
   libspng-dev libsystemd-dev libturbojpeg0-dev libzstd-dev libcairo2-dev fonts-dejavu-core
   liblcm-dev liblcm-bin libglib2.0-dev iproute2
-  libgtest-dev libbenchmark-dev valgrind
+  libgtest-dev libbenchmark-dev systemd valgrind
 )
 if [[ "${1:-}" == --lint ]]; then
   packages+=(clang-14 clang-format-14 clang-tidy-14)
+elif [[ "${1:-}" == --cross ]]; then
+  packages+=(g++-aarch64-linux-gnu qemu-user-static)
 elif [[ $# -gt 0 ]]; then
-  echo "setup.sh: unknown argument '$1'; only --lint is known" >&2
+  echo "setup.sh: unknown argument '$1'; only --lint and --cross are known" >&2
   exit 2
 fi
 

@@ -2,16 +2,20 @@
 # Installs what is missing, builds, runs every test that this machine can run:
 #   format, release build with all tests, unit tests under AddressSanitizer + UBSan, the thread pool's under
 #   ThreadSanitizer.  --tidy: clang-tidy over the whole tree as well (minutes).
+#   --cross: the kernels' tests for 64-bit ARM as well, under emulation (minutes).
 # A part that passed is not repeated until a source file changes.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 tidy=no
-case "${1:-}" in
-  '') ;;
-  --tidy) tidy=yes ;;
-  *) echo "test.sh: unknown argument '$1'; only --tidy is known" >&2; exit 2 ;;
-esac
+cross=no
+for argument in "$@"; do
+  case "$argument" in
+    --tidy) tidy=yes ;;
+    --cross) cross=yes ;;
+    *) echo "test.sh: unknown argument '$argument'; only --tidy and --cross are known" >&2; exit 2 ;;
+  esac
+done
 
 toolchain/setup.sh --lint
 start=$SECONDS
@@ -76,6 +80,7 @@ part release release_tests
 part asan asan_tests
 part tsan tsan_tests
 [[ $tidy == no ]] || part tidy tidy_tree
+[[ $cross == no ]] || part cross toolchain/cross_build.sh --tests
 
 echo
 passed=$((parts - ${#failed[@]}))

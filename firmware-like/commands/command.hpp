@@ -36,7 +36,6 @@ void add_memory_plan(CLI::App& app, int& exit_code);
 void add_top(CLI::App& app, int& exit_code);
 void add_check_config(CLI::App& app, int& exit_code);
 void add_replay(CLI::App& app, int& exit_code);
-/// doctor: its flags parse; calling it says that the part is not in this build.
-void add_parts_not_built(CLI::App& app, int& exit_code);
+void add_doctor(CLI::App& app, int& exit_code);
 
 }  // namespace stillmap

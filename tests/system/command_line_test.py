@@ -125,10 +125,27 @@ class Usage(Case):
 
     def test_parts_that_are_not_built_say_so(self):
         for arguments in [["run", "--source", SMALL, "--device", "cuda"],
-                          ["run", "--source", "xtion"],
-                          ["doctor"]]:
+                          ["run", "--source", "xtion"]]:
             done = self.refused(2, *arguments)
             self.assertIn("build", done.stderr, arguments)
+
+    def test_doctor(self):
+        done = stillmap("doctor", "--source", SMALL, "--out", self.out)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        for part in ["configuration", "source", "memory", "priority", "processors", "cuda", "lcm route", "lcm buffers",
+                     "clock", "out"]:
+            self.assertRegex(done.stdout, rf"(?m)^(OK|worse) +{part} ")
+        self.assertNotIn("WRONG", done.stdout)
+        self.assertFalse(self.out.exists(), "it only looks")
+        file = self.folder / "file"
+        file.touch()
+        for arguments, part in [(["--source", "v4l2:/dev/video98,/dev/video99"], "camera"),
+                                (["--source", f"tum:{self.folder}/none"], "source"),
+                                (["--set", "track.levels=9"], "configuration"),
+                                (["--out", file], "out")]:
+            done = stillmap("doctor", *arguments)
+            self.assertEqual(done.returncode, 1, done.stdout + done.stderr)
+            self.assertRegex(done.stdout, rf"(?m)^WRONG +{part} .*\n(.*\n)* +mend: .")
 
     def test_configuration(self):
         config = self.folder / "c.toml"
@@ -160,6 +177,8 @@ class Usage(Case):
         self.assertIn("archive: groups on their way", done.stdout)
         paper = ROOT / "config/presets/paper.toml"
         done = stillmap("memory-plan", "--config", paper)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        done = stillmap("memory-plan", "--config", ROOT / "config/presets/jetson.toml")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.refused(2, "memory-plan", "--set", "memory.budget_mb=10", says=["memory.budget_mb"])
         done = self.refused(2, "run", "--source", SMALL, "--set", "memory.budget_mb=10", "--out", self.out,
