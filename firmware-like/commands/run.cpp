@@ -205,7 +205,7 @@ int run_with(FrameSource& source, const RunOptions& o, const RunPlan& plan, std:
              Lcm& lcm, UtcClock& clock, ServiceManager* service, FrameObserver* observer) {
   const Config& config = plan.config;
   EngineParams params = engine_params(config, source.info().camera, source.info().depth_units_per_m);
-  params.on_worker_start = heap_guard::arm_this_thread;
+  params.on_worker = heap_guard::arm_worker;
   const MemoryPlan memory = plan_memory(config, params);
   if (const auto fits = check_budget(memory); !fits) return fail(fits.error(), fits.error_kind());
   const std::unique_ptr<Engine> engine = make_cpu_engine(params);

@@ -63,6 +63,9 @@ void arm_this_thread() {
 void disarm_this_thread() {
   --t_armed;
 }
+void arm_worker(bool starts) {
+  starts ? arm_this_thread() : disarm_this_thread();
+}
 uint64_t allocations() {
   return g_allocations.load(std::memory_order_relaxed);
 }

@@ -11,6 +11,8 @@ namespace stillmap::heap_guard {
 /// From now on what the calling thread does with the heap is counted. May be nested.
 void arm_this_thread();
 void disarm_this_thread();
+/// For the workers of an engine: armed while they live (EngineParams::on_worker).
+void arm_worker(bool starts);
 /// Heap calls of armed threads since the program started, `free` included. @thread any
 uint64_t allocations();
 /// From now on the first heap call of an armed thread prints where it came from and ends the program. The

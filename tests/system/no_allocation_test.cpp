@@ -91,7 +91,7 @@ class RealTimeLoop : public testing::Test {
     source_ = std::move(*opened);
     const SourceInfo& info = source_->info();
     EngineParams params = engine_params(config, info.camera, info.depth_units_per_m);
-    params.on_worker_start = heap_guard::arm_this_thread;
+    params.on_worker = heap_guard::arm_worker;
     engine_ = make_cpu_engine(params);
     ASSERT_NE(engine_, nullptr);
     memory_.emplace(info);

@@ -186,7 +186,7 @@ struct CpuMemory {
 class CpuEngine final : public Engine {
  public:
   CpuEngine(const EngineParams& params, const CpuLoops& loops, uint64_t bytes)
-      : params_(params), arena_(bytes), loops_(loops), pool_(params.threads, params.on_worker_start) {
+      : params_(params), arena_(bytes), loops_(loops), pool_(params.threads, params.on_worker) {
     if (arena_.failed()) return;
     memory_.carve(arena_, params_);
     memory_.map.clear();

@@ -4,12 +4,13 @@
 
 namespace stillmap {
 
-ThreadPool::ThreadPool(int32_t threads, void (*on_start)()) {
+ThreadPool::ThreadPool(int32_t threads, void (*on_worker)(bool starts)) {
   constexpr int32_t kMost = 64;
   for (int32_t i = 1; i < std::min(threads, kMost); ++i)
-    workers_.emplace_back([this, on_start] {
-      if (on_start != nullptr) on_start();
+    workers_.emplace_back([this, on_worker] {
+      if (on_worker != nullptr) on_worker(true);
       worker_loop();
+      if (on_worker != nullptr) on_worker(false);
     });
 }
 
