@@ -140,6 +140,12 @@ TEST(Validate, MapOnTheWayNeedsAMap) {
   EXPECT_TRUE(mentions(after([](Config& c) { c.record.map_every_s = 60; }), "record.map_every_s = 60.0"));
 }
 
+TEST(Validate, TheLogHasRoomForTwoFilesAndFramesNeedIt) {
+  EXPECT_TRUE(mentions(after([](Config& c) { c.record.log_max_bytes = 1.9f * c.record.log_file_bytes; }),
+                       "must be at least twice record.log_file_bytes"));
+  EXPECT_TRUE(mentions(after([](Config& c) { c.record.frames = true; }), "record.log is false"));
+}
+
 TEST(Validate, PartsOfOtherBuildsAreNamed) {
   EXPECT_TRUE(mentions(after([](Config& c) { c.depth.invalid = InvalidDepth::complete; }),
                        "depth.invalid = complete is not part of this build"));
