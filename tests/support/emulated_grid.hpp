@@ -55,14 +55,20 @@ class EmulatedBlock {
   template <class T>
   PerLane<T> shuffle_down(const PerLane<T>& x, uint32_t n) const {
     PerLane<T> out;
-    for (uint32_t lane = 0; lane < kLanes; ++lane)
-      out[lane] = x[lane % kWarp + n < kWarp ? lane + n : lane];
+    for (uint32_t lane = 0; lane < kLanes; ++lane) out[lane] = x[lane % kWarp + n < kWarp ? lane + n : lane];
     return out;
   }
   template <class T>
   PerLane<T> shuffle_up(const PerLane<T>& x, uint32_t n) const {
     PerLane<T> out;
     for (uint32_t lane = 0; lane < kLanes; ++lane) out[lane] = x[lane % kWarp >= n ? lane - n : lane];
+    return out;
+  }
+  PerLane<uint32_t> ballot(const PerLane<uint32_t>& x) const {
+    PerLane<uint32_t> out;
+    for (uint32_t lane = 0; lane < kLanes; ++lane)
+      for (uint32_t i = 0; i < kWarp; ++i)
+        out[lane] |= static_cast<uint32_t>(x[lane / kWarp * kWarp + i] != 0) << i;
     return out;
   }
 

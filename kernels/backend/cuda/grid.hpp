@@ -17,6 +17,7 @@
 //   PerLane<Block, T> x; x[lane]         a value that a lane keeps; in registers on the GPU
 //   block.shuffle_down(x, n)             PerLane: the value of lane + n of the same warp, else the own one
 //   block.shuffle_up(x, n)               PerLane: the value of lane - n of the same warp, else the own one
+//   block.ballot(x)                      PerLane: bit i for lane i of the same warp where x is not 0
 //   block.fence()                        what was written is seen by the other blocks before what follows
 //   block.shared()                       Shared&
 
