@@ -16,6 +16,7 @@
 #include "drivers/registry.hpp"
 #include "firmware-like/commands/command.hpp"
 #include "firmware-like/commands/common.hpp"
+#include "firmware-like/commands/engines.hpp"
 #include "firmware-like/commands/progress.hpp"
 #include "firmware-like/commands/run_loop.hpp"
 #include "firmware-like/commands/run_options.hpp"
@@ -118,9 +119,10 @@ int run(const RunOptions& o, FrameObserver* observer) {
   source.skip(o.skip_frames);
 
   const EngineParams params = engine_params(config, source.info().camera, source.info().depth_units_per_m);
-  const MemoryPlan memory = plan_memory(config, params);
+  const std::string device = pick_device(o.device);
+  const MemoryPlan memory = plan_memory(config, params, device);
   if (const auto fits = check_budget(memory); !fits) return fail(fits.error(), fits.error_kind());
-  const std::unique_ptr<Engine> engine = make_cpu_engine(params);
+  const std::unique_ptr<Engine> engine = make_engine(device, params);
   if (!engine)
     return fail(
         fmt::format("the {} MB of the memory plan cannot be had from this machine; lower map.pool_blocks",
@@ -144,9 +146,10 @@ int run(const RunOptions& o, FrameObserver* observer) {
   info.camera = params.camera;
   const int64_t frames = expected_frames(info, o);
   auto outputs =
-      RunOutputs::create(o.out, config, info, frames, Report("cpu", params.threads, memory.total_bytes));
+      RunOutputs::create(o.out, config, info, frames, Report(device, params.threads, memory.total_bytes));
   if (!outputs) return fail(outputs.error(), ErrorKind::failed);
-  (*outputs)->event(Stamp{}, "start", fmt::format("{}, cpu engine, {} threads", info.name, params.threads));
+  (*outputs)->event(Stamp{}, "start",
+                    fmt::format("{}, {} engine, {} threads", info.name, device, params.threads));
 
   if (!loaded_text.empty()) (*outputs)->event(Stamp{}, "map_load", loaded_text);
   (*outputs)->prepare_map(*engine, archive.get());

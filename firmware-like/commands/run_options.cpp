@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "firmware-like/commands/common.hpp"
+#include "firmware-like/commands/engines.hpp"
 #include "runtime/evaluate/trajectory.hpp"
 
 namespace stillmap {
@@ -47,8 +48,7 @@ std::string apply_number(const std::string& flag, const std::string& text, doubl
 
 /// Flags whose part is not in this build.
 std::string part_not_built(const RunOptions& o) {
-  if (o.device == "cuda")
-    return "--device cuda: this build has no CUDA engine; use --device auto or --device cpu";
+  if (const std::string refused = cuda_refused(o.device); !refused.empty()) return refused;
   if (o.lcm != "off") return "--lcm " + o.lcm + ": LCM is not part of this build; use --lcm off";
   if (o.realtime)
     return "--realtime: playing at the pace of the stamps is not part of this build; leave the flag out";

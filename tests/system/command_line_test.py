@@ -124,8 +124,7 @@ class Usage(Case):
         self.refused(2, "run", "--source", "synthetic:no_such_scene", says=["no_such_scene"])
 
     def test_parts_that_are_not_built_say_so(self):
-        for arguments in [["run", "--source", SMALL, "--device", "cuda"],
-                          ["run", "--source", SMALL, "--lcm", "udpm://239.255.76.67:7667?ttl=0"],
+        for arguments in [["run", "--source", SMALL, "--lcm", "udpm://239.255.76.67:7667?ttl=0"],
                           ["run", "--source", SMALL, "--realtime"],
                           ["run", "--source", SMALL, "--set", "record.log=true"],
                           ["run", "--source", "xtion"],
@@ -133,6 +132,14 @@ class Usage(Case):
                           ["bench", "soak"]]:
             done = self.refused(2, *arguments)
             self.assertIn("build", done.stderr, arguments)
+
+    def test_a_gpu_that_is_not_there_is_said(self):
+        if os.path.exists("/dev/nvidiactl") or os.path.exists("/dev/nvgpu"):
+            self.skipTest("this machine may have one")
+        self.refused(2, "run", "--source", SMALL, "--device", "cuda", says=["--device cuda", "--device auto"])
+        done = stillmap("run", "--source", SMALL, "--device", "auto", "--max-frames", "2", "--quiet")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertLessEqual(done.stderr.count("CUDA"), 2, done.stderr)  # one line, which may name it twice
 
     def test_configuration(self):
         config = self.folder / "c.toml"

@@ -26,6 +26,7 @@
 #include "kernels/backend/cuda/map_update.hpp"
 #include "kernels/backend/cuda/mask_kernels.hpp"
 #include "kernels/backend/cuda/pixel_kernels.hpp"
+#include "kernels/backend/cuda/place_kernels.hpp"
 #include "kernels/backend/cuda/track_kernel.hpp"
 #include "kernels/backend/cuda/view_kernels.hpp"
 #include "kernels/engine.hpp"
@@ -36,6 +37,7 @@
 #include "kernels/mask/slide.hpp"
 #include "kernels/mask/static_pixels.hpp"
 #include "kernels/raycast/raycast_pass.hpp"
+#include "kernels/relocalise/place_store.hpp"
 #include "kernels/track/track.hpp"
 
 namespace stillmap {
@@ -48,7 +50,8 @@ enum class DeviceStep : uint32_t {
   mask,      ///< from cells, or from pixels, to the mask
   refine,
   integrate,
-  look,  ///< at groups only, for the archive
+  look,    ///< at groups only, for the archive
+  places,  ///< small views of the frame
   count_
 };
 
@@ -80,6 +83,10 @@ struct DeviceStates {
     StaticDepthPass depth;
     UpdateState update;
   } integrate;
+  struct Places {
+    ShrinkPass shrink;
+    HalvePass halve;
+  } places;
   MapCounters counters;
   MapMail mail;
 };
@@ -135,6 +142,8 @@ struct DeviceMemory {
   View<BlockId> order;
   View<uint32_t> first_vertex, first_triangle;
   View<CubeCases> cube_cases;
+  SmallView small[2];
+  TryScratch scratch_of_tries[PlaceStore::kMaxTries];
 
   void carve(Arena& arena, const EngineParams& p) {
     const Intrinsics& k = p.camera.k;
@@ -154,6 +163,7 @@ struct DeviceMemory {
     partial = arena.take<NormalEqT<float>>("device: images", TrackKernel::kMostBlocks);
     carve_map(arena, p);
     carve_views(arena, static_cast<uint64_t>(p.map.pool_blocks));
+    if (p.relocalise.enabled) carve_places(arena, p);
   }
 
  private:
@@ -226,6 +236,25 @@ struct DeviceMemory {
     first_triangle = arena.take<uint32_t>("device: mesh and views", blocks + 1);
     cube_cases = arena.take<CubeCases>("device: mesh and views", 1);
   }
+  void carve_places(Arena& arena, const EngineParams& p) {
+    const char* name = "device: relocalisation";
+    const Intrinsics fine = shrunk(p.camera.k, cell_px(p.camera.k.width)), coarse = shrunk(fine, 2);
+    for (int32_t i = 0; i < 2; ++i) {
+      const Intrinsics& k = i == 0 ? fine : coarse;
+      small[i] = {arena.take_image<float>(name, k.height, k.width),
+                  arena.take_image<float>(name, k.height, k.width)};
+    }
+    const Intrinsics wide = widened(coarse);
+    for (TryScratch& s : scratch_of_tries) {
+      s.model.k = wide;
+      s.model.depth_m = arena.take_image<float>(name, wide.height, wide.width);
+      s.model.normal = arena.take_image<Vec3>(name, wide.height, wide.width);
+      s.colour = arena.take<Rgb8>(
+          name, static_cast<uint64_t>(std::max(wide.width * wide.height, fine.width * fine.height)));
+      s.expected_m = arena.take_image<float>(name, fine.height, fine.width);
+      s.map_luma = arena.take_image<float>(name, fine.height, fine.width);
+    }
+  }
 };
 
 /// Memory that both sides reach.
@@ -242,6 +271,7 @@ struct SharedMemory {
   PartMemory part_memory;
   View<uint8_t> post;  ///< for whatever is asked outside of frames
   View<uint32_t> first_vertex, first_triangle;
+  PlaceStore places;
 
   void carve(Arena& arena, const EngineParams& p) {
     const Intrinsics& k = p.camera.k;
@@ -257,6 +287,7 @@ struct SharedMemory {
     const uint64_t blocks = static_cast<uint64_t>(p.map.pool_blocks);
     first_vertex = arena.take<uint32_t>("shared: mesh, views, records", blocks);
     first_triangle = arena.take<uint32_t>("shared: mesh, views, records", blocks + 1);
+    places.carve(arena, p);
   }
 
  private:
@@ -288,7 +319,7 @@ struct SharedMemory {
 };
 
 template <class Device>
-class DeviceEngine final : public Engine {
+class DeviceEngine : public Engine {
  public:
   /// What it takes, item by item.
   static MemoryItems plan(const EngineParams& params, MemoryItems& shared) {
@@ -345,9 +376,11 @@ class DeviceEngine final : public Engine {
   uint32_t write_group(uint64_t key, View<uint8_t> record) const override;
   Status read_group(View<const uint8_t> record) override;
   uint32_t group_capacity() const override { return d_.map.view.table.keys.size; }
-  uint32_t place_count() const override { return 0; }
-  uint32_t write_place(uint32_t, View<uint8_t>) const override { return 0; }
-  Status read_place(View<const uint8_t>) override { return Status::unavailable; }
+  uint32_t place_count() const override { return h_.places.keyframes(); }
+  uint32_t write_place(uint32_t index, View<uint8_t> record) const override {
+    return h_.places.write(index, record);
+  }
+  Status read_place(View<const uint8_t> record) override { return h_.places.read(record); }
 
   uint32_t farthest_groups(Vec3 centre_map, View<uint64_t> keys, bool near_view_too) override;
   void put_away(uint64_t key, uint32_t entry) override { change_group({d_.map, key, entry, false}); }
@@ -367,6 +400,7 @@ class DeviceEngine final : public Engine {
   void reset_map() override {
     clear_map();
     forget_cells();
+    h_.places.clear();
     h_.states->integrate.update.groups = 0;
   }
 
@@ -437,6 +471,8 @@ class DeviceEngine final : public Engine {
   bool find_parts(const Se3& T_map_cam);
   void remember_cells(const Se3& T_map_cam);
   void set_view(const Se3& T_map_cam);
+  bool shrink_frame();
+  void follow(View<PoseTry> tries);
   bool drop_farthest(Vec3 centre_map);
   float fill() const;
   bool above_high_water() const;

@@ -34,6 +34,20 @@ void DeviceEngine<Device>::record_steps() {
       launch_mask_by_residual();
   });
   record(DeviceStep::integrate, [this] { launch_integrate(); });
+  record(DeviceStep::places, [this] {
+    if (!h_.places.enabled()) return;
+    send(d_.states->places, h_.states->places);
+    for (int32_t i = 0; i < 2; ++i) {
+      const ImageView<float>&depth_m = d_.small[i].depth_m, &luma = d_.small[i].luma;
+      if (i == 0)
+        launch_pixels(PixelKernel<ShrinkPass>{&d_.states->places.shrink, depth_m.rows, depth_m.cols});
+      else
+        launch_pixels(PixelKernel<HalvePass>{&d_.states->places.halve, depth_m.rows, depth_m.cols});
+      const uint64_t bytes = static_cast<uint64_t>(depth_m.pixels()) * sizeof(float);
+      device_.copy(h_.places.view(i).depth_m.data, depth_m.data, bytes);
+      device_.copy(h_.places.view(i).luma.data, luma.data, bytes);
+    }
+  });
   record(DeviceStep::look, [this] {
     send(d_.states->integrate, h_.states->integrate);
     launch_look();

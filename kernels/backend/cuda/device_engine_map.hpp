@@ -306,15 +306,55 @@ Status DeviceEngine<Device>::extract_mesh(MeshSink& sink) {
   return done ? Status::ok : Status::unavailable;
 }
 
+/// The small views of the last prepared frame, on both sides. @return false: the device has failed
 template <class Device>
-void DeviceEngine<Device>::remember_place(const Se3&) {}
-template <class Device>
-PlaceResult DeviceEngine<Device>::find_place(const Se3&, int32_t) {
-  return {};
+bool DeviceEngine<Device>::shrink_frame() {
+  DeviceStates::Places& state = h_.states->places;
+  state.shrink = {d_.depth_m, d_.luma_chroma, d_.mask, h_.places.cell_px(), params_.depth.max_m, d_.small[0]};
+  state.halve = {d_.small[0], d_.small[1]};
+  return play(DeviceStep::places);
 }
+
 template <class Device>
-PlaceResult DeviceEngine<Device>::confirm_place(const Se3&) {
-  return {};
+void DeviceEngine<Device>::remember_place(const Se3& T_map_cam) {
+  if (h_.places.enabled() && shrink_frame()) h_.places.remember(T_map_cam);
+}
+
+template <class Device>
+void DeviceEngine<Device>::follow(View<PoseTry> tries) {
+  auto* const posted = reinterpret_cast<PoseTry*>(h_.post.data);
+  std::copy_n(tries.data, tries.size, posted);
+  FollowTriesKernel kernel{d_.map.view,
+                           {posted, tries.size},
+                           {},
+                           {d_.small[0], d_.small[1]},
+                           {h_.places.view_k(0), h_.places.view_k(1)},
+                           h_.places.params()};
+  std::copy_n(d_.scratch_of_tries, PlaceStore::kMaxTries, kernel.scratch);
+  device_.launch(tries.size, kernel);
+  if (device_.wait() != Status::ok) {
+    for (PoseTry& t : tries) t.check = {};
+    return;
+  }
+  std::copy_n(posted, tries.size, tries.data);
+}
+
+template <class Device>
+PlaceResult DeviceEngine<Device>::find_place(const Se3& T_map_cam_guess, int32_t attempt) {
+  if (!h_.places.enabled() || !shrink_frame()) return {};
+  auto all = [this](View<PoseTry> tries) { follow(tries); };
+  const PlaceResult result = h_.places.find(T_map_cam_guess, attempt, follower(all));
+  if (result.status == Status::ok || h_.states->counters.archived_groups == 0) return result;
+  set_view(result.T_map_wanted);
+  play(DeviceStep::look);
+  return result;
+}
+
+template <class Device>
+PlaceResult DeviceEngine<Device>::confirm_place(const Se3& T_map_cam_start) {
+  if (!h_.places.enabled() || !shrink_frame()) return {};
+  auto all = [this](View<PoseTry> tries) { follow(tries); };
+  return h_.places.confirm(T_map_cam_start, follower(all));
 }
 
 }  // namespace stillmap

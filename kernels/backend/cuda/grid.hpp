@@ -13,8 +13,8 @@
 // the same for all lanes of a block. That makes a barrier that only some lanes reach impossible.
 //   block.index(), block.count()         which block of how many
 //   block.each(f)                        f(lane) for every lane, then a barrier
-//   block.privately(f)                   f(lane) without a barrier: touches nothing but PerLane values
-//   PerLane<Block, T> x; x[lane]         a value that a lane keeps; in registers on the GPU
+//   block.privately(f)                   f(lane) without a barrier: reads nothing that another lane writes
+//   here PerLane<Block, T> x; x[lane]         a value that a lane keeps; in registers on the GPU
 //   block.shuffle_down(x, n)             PerLane: the value of lane + n of the same warp, else the own one
 //   block.shuffle_up(x, n)               PerLane: the value of lane - n of the same warp, else the own one
 //   block.ballot(x)                      PerLane: bit i for lane i of the same warp where x is not 0
