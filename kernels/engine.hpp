@@ -241,4 +241,14 @@ uint32_t plan_group_capacity(const EngineParams& params);
 /// @return null when the memory cannot be had.  @thread boot
 std::unique_ptr<Engine> make_cpu_engine(const EngineParams& params);
 
+/// Whether this program has the CUDA engine.
+bool cuda_is_built();
+/// Null when the CUDA engine can be had here, else why not.  @thread boot
+const char* cuda_missing();
+/// What make_cuda_engine would take, on the device and of memory that both sides reach.
+MemoryItems plan_cuda_engine(const EngineParams& params);
+/// Takes all memory, records what the steps of a frame launch.
+/// @return null when there is no device, or not enough memory.  @thread boot
+std::unique_ptr<Engine> make_cuda_engine(const EngineParams& params);
+
 }  // namespace stillmap

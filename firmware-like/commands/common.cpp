@@ -5,6 +5,7 @@
 #include "config/load.hpp"
 #include "config/validate.hpp"
 #include "firmware-like/commands/command.hpp"
+#include "firmware-like/commands/engines.hpp"
 #include "firmware-like/commands/stop_signal.hpp"
 #include "runtime/archive/map_saver.hpp"
 #include "runtime/record/log_recorder.hpp"
@@ -75,8 +76,8 @@ BlockArchive::Options archive_options(const Config& config) {
   return options;
 }
 
-MemoryPlan plan_memory(const Config& config, const EngineParams& params) {
-  MemoryPlan plan = memory_plan(config, params.camera, params.depth_units_per_m);
+MemoryPlan plan_memory(const Config& config, const EngineParams& params, const std::string& device) {
+  MemoryPlan plan = memory_plan(config, params.camera, plan_engine(device, params));
   if (!config.archive.dir.empty())
     plan.add("archive: groups on their way", BlockArchive::planned_bytes(archive_options(config)));
   if (config.record.map)

@@ -28,7 +28,8 @@ Result<Done> check(const Config& config);
 BlockArchive::Options archive_options(const Config& config);
 
 /// All memory of a run: the engine, the frames, archive and saving of the map where they are asked for.
-MemoryPlan plan_memory(const Config& config, const EngineParams& params);
+/// @param device as pick_device answers
+MemoryPlan plan_memory(const Config& config, const EngineParams& params, const std::string& device = "cpu");
 
 /// What a source has to be told: the camera and the stamps where the configuration overrides them.
 SourceOptions source_options(const Config& config);

@@ -19,6 +19,7 @@
 #include "drivers/registry.hpp"
 #include "firmware-like/commands/command.hpp"
 #include "firmware-like/commands/common.hpp"
+#include "firmware-like/commands/engines.hpp"
 #include "firmware-like/commands/progress.hpp"
 #include "firmware-like/commands/run_options.hpp"
 #include "firmware-like/commands/run_outputs.hpp"
@@ -206,9 +207,10 @@ int run_with(FrameSource& source, const RunOptions& o, const RunPlan& plan, std:
   const Config& config = plan.config;
   EngineParams params = engine_params(config, source.info().camera, source.info().depth_units_per_m);
   params.on_worker = heap_guard::arm_worker;
-  const MemoryPlan memory = plan_memory(config, params);
+  const std::string device = pick_device(o.device, o.quiet);
+  const MemoryPlan memory = plan_memory(config, params, device);
   if (const auto fits = check_budget(memory); !fits) return fail(fits.error(), fits.error_kind());
-  const std::unique_ptr<Engine> engine = make_cpu_engine(params);
+  const std::unique_ptr<Engine> engine = make_engine(device, params);
   if (!engine)
     return fail(
         fmt::format("the {} MB of the memory plan cannot be had from this machine; lower map.pool_blocks",
@@ -234,11 +236,12 @@ int run_with(FrameSource& source, const RunOptions& o, const RunPlan& plan, std:
   }
   const int64_t frames = expected_frames(info, o);
   auto made =
-      RunOutputs::create(o.out, config, info, frames, Report("cpu", params.threads, memory.total_bytes));
+      RunOutputs::create(o.out, config, info, frames, Report(device, params.threads, memory.total_bytes));
   if (!made) return fail(made.error(), ErrorKind::failed);
   RunState state;
   RunOutputs& outputs = **made;
-  outputs.event(Stamp{}, "start", fmt::format("{}, cpu engine, {} threads", info.name, params.threads));
+  outputs.event(Stamp{}, "start",
+                fmt::format("{}, {} engine, {} threads", info.name, device, params.threads));
   if (!loaded_text.empty()) outputs.event(Stamp{}, "map_load", loaded_text);
 
   FrameOdometry odometry(lcm.odometry ? lcm.odometry.get() : source.odometry());

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "firmware-like/commands/common.hpp"
+#include "firmware-like/commands/engines.hpp"
 #include "runtime/evaluate/trajectory.hpp"
 
 namespace stillmap {
@@ -43,13 +44,6 @@ std::string apply_number(const std::string& flag, const std::string& text, doubl
       return {};
   }
   return fmt::format("{} {}: expected a number from {} to {}", flag, text, min, max);
-}
-
-/// Flags whose part is not in this build.
-std::string part_not_built(const RunOptions& o) {
-  if (o.device == "cuda")
-    return "--device cuda: this build has no CUDA engine; use --device auto or --device cpu";
-  return {};
 }
 
 }  // namespace
@@ -96,7 +90,7 @@ Result<Done> apply_camera(Config& config, const std::string& text) {
 }
 
 Result<RunPlan> plan_run(const RunOptions& o) {
-  if (const std::string missing = part_not_built(o); !missing.empty()) return usage(missing);
+  if (const std::string missing = cuda_refused(o.device); !missing.empty()) return usage(missing);
   auto config = read_config(o.config, o.settings);
   if (!config) return usage(config.error());
   RunPlan plan{*config, {}};

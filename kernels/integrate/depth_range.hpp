@@ -51,6 +51,19 @@ struct DepthRangePyramid {
 };
 static_assert(kTilePx == 1 << 3);
 
+/// One tile of a level from the four (fewer at the border) of the level below it.
+struct MergeRangesPass {
+  ImageView<const DepthRange> fine;
+  ImageView<DepthRange> coarse;
+
+  STILLMAP_HD void operator()(int32_t row, int32_t col) const {
+    const int32_t r1 = 2 * row + 1 < fine.rows ? 2 * row + 1 : fine.rows - 1,
+                  c1 = 2 * col + 1 < fine.cols ? 2 * col + 1 : fine.cols - 1;
+    coarse.at(row, col) = merged(merged(fine.at(2 * row, 2 * col), fine.at(2 * row, c1)),
+                                 merged(fine.at(r1, 2 * col), fine.at(r1, c1)));
+  }
+};
+
 /// Static depth (masked pixels removed) and its finest tiles.
 struct StaticDepthPass {
   ImageView<const float> depth_m;

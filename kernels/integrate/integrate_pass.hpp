@@ -36,7 +36,6 @@ struct IntegratePass {
 
   template <class Voxels>
   STILLMAP_HD void operator()(VisibleBlock visible, const Voxels& voxels) const {
-    using F = typename Voxels::Number;
     const BlockId id = visible.id();
     if (visible.partly()) return mark_seen(map.partly[id], voxels);
     if (visible.all_free() && map.settled_free[id]) return;
@@ -46,28 +45,48 @@ struct IntegratePass {
     for (int32_t z = 0; z < kBlockEdge; ++z)
       for (int32_t y = 0; y < kBlockEdge; ++y)
         for (int32_t x = 0; x < kBlockEdge; x += Voxels::kCount) {
-          Observation<F> o = {voxels.all(), !voxels.all(), F(0.0f), IntOf<F>(0)};
-          if (!visible.all_free()) o = observe(geometry, grid.position<F>(voxels.ramp(x), y, z));
-          if (!voxels.any(o.free | o.band)) continue;
-          const int32_t i = voxel_index(x, y, z);
-          VoxelState<F> state = voxels.load(block, i);
-          if (!free_space) o.free = o.free & (state.weight > F(0.0f));
-          const IntOf<F> voxel = voxels.index(i) + IntOf<F>(static_cast<int32_t>(id) * kBlockVoxels);
-          F luma = F(0.0f), cb = F(0.0f), cr = F(0.0f);
-          const bool band = voxels.any(o.band);
-          if (band) voxels.load_colour(colour, o.pixel, luma, cb, cr);
-          state = fused(state, o, luma, cb, cr, weights, band ? dither<F>(voxel, frame) : F(0.0f));
-          voxels.store(block, i, state);
-          settled = settled && !voxels.any((state.sdf < F(static_cast<float>(kSdfMax))) |
-                                           (state.weight < F(weights.weight_cap)));
-          touched_band |= band;
+          const Touched touched = fuse(visible, block, grid, voxels, x, y, z);
+          settled = settled && !touched.unsettled;
+          touched_band |= touched.band;
         }
+    note_settled(visible, settled, touched_band, !dense && !touched_band && no_surface_left(block));
+  }
+
+  /// What became of the voxels that F holds.
+  struct Touched {
+    bool unsettled = false;  ///< some may still change when they are seen free again
+    bool band = false;       ///< some lie on a surface
+  };
+  /// One step over the voxels of a block, from (x, y, z) on along x.
+  template <class Voxels>
+  STILLMAP_HD Touched fuse(VisibleBlock visible, VoxelBlock& block, const VoxelGrid& grid,
+                           const Voxels& voxels, int32_t x, int32_t y, int32_t z) const {
+    using F = typename Voxels::Number;
+    Observation<F> o = {voxels.all(), !voxels.all(), F(0.0f), IntOf<F>(0)};
+    if (!visible.all_free()) o = observe(geometry, grid.position<F>(voxels.ramp(x), y, z));
+    if (!voxels.any(o.free | o.band)) return {};
+    const int32_t i = voxel_index(x, y, z);
+    VoxelState<F> state = voxels.load(block, i);
+    if (!free_space) o.free = o.free & (state.weight > F(0.0f));
+    const IntOf<F> voxel = voxels.index(i) + IntOf<F>(static_cast<int32_t>(visible.id()) * kBlockVoxels);
+    F luma = F(0.0f), cb = F(0.0f), cr = F(0.0f);
+    const bool band = voxels.any(o.band);
+    if (band) voxels.load_colour(colour, o.pixel, luma, cb, cr);
+    state = fused(state, o, luma, cb, cr, weights, band ? dither<F>(voxel, frame) : F(0.0f));
+    voxels.store(block, i, state);
+    return {voxels.any((state.sdf < F(static_cast<float>(kSdfMax))) | (state.weight < F(weights.weight_cap))),
+            band};
+  }
+  /// @param no_surface of a map that is not dense: nothing is in the band, and no surface was left before
+  STILLMAP_HD void note_settled(VisibleBlock visible, bool settled, bool touched_band,
+                                bool no_surface) const {
+    uint8_t& note = map.settled_free[visible.id()];
     if (!dense)
-      map.settled_free[id] = !touched_band && no_surface_left(block) ? kNoSurfaceLeft : uint8_t{0};
+      note = no_surface ? kNoSurfaceLeft : uint8_t{0};
     else if (visible.all_free())
-      map.settled_free[id] = settled;
+      note = settled;
     else if (touched_band)
-      map.settled_free[id] = 0;
+      note = 0;
   }
 
  private:

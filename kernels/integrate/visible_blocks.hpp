@@ -96,6 +96,31 @@ STILLMAP_HD CubeGeometry cube_geometry(int32_t voxels, float voxel_m) {
   return {{half_m, half_m, half_m}, 1.7320509f * half_m};
 }
 
+/// A box of groups.
+struct GroupBox {
+  Int3 first, groups;
+};
+/// The box of groups around a view, from the camera to `farthest_m` along the optical axis, and `around_m`
+/// more on all sides.
+STILLMAP_HD GroupBox box_around_view(const Se3& T_map_cam, const Intrinsics& k, float farthest_m,
+                                     float around_m, float group_m) {
+  Vec3 low = T_map_cam.translation, high = low;
+  for (int32_t corner = 0; corner < 4; ++corner) {
+    const float u = corner & 1 ? static_cast<float>(k.width) : -1.0f;
+    const float v = corner & 2 ? static_cast<float>(k.height) : -1.0f;
+    const Vec3 p = T_map_cam * unproject(k, u, v, farthest_m);
+    low = {min_of(low.x, p.x), min_of(low.y, p.y), min_of(low.z, p.z)};
+    high = {max_of(high.x, p.x), max_of(high.y, p.y), max_of(high.z, p.z)};
+  }
+  low = low - Vec3{around_m, around_m, around_m};
+  high = high + Vec3{around_m, around_m, around_m};
+  const float inv = 1.0f / group_m;
+  const auto cell = [&](float x) { return static_cast<int32_t>(floorf(x * inv)); };
+  const Int3 first = {cell(low.x), cell(low.y), cell(low.z)},
+             last = {cell(high.x), cell(high.y), cell(high.z)};
+  return {first, {last.x - first.x + 1, last.y - first.y + 1, last.z - first.z + 1}};
+}
+
 /// What a frame does to one group of blocks: a bit a block.
 struct GroupView {
   uint64_t free = 0;             ///< all of the block is seen free, and that says something new
@@ -130,24 +155,40 @@ struct VisibleGroupPass {
   STILLMAP_HD GroupView operator()(uint32_t group_index, const Voxels& voxels) const {
     GroupView view;
     const Int3 at = group_at(group_index);
-    const BlockRef group = map.table.find(pack(at));
-    // Nothing is told to a group that is away: what it held is not to be made anew beside it.
-    if (is_archived(group)) {
-      if (comes_into_view(at)) view.archived = group;
-      return view;
-    }
-    const BlockView whole = look(block_in_group(at, 0), group_cube());
-    if (whole == BlockView::nothing) return view;
-    const CubeGeometry cube = cube_geometry(kBlockEdge, map.voxel_m);
-    if ((whole == BlockView::free || whole == BlockView::free_if_measured) && settled(group)) return view;
-    for (int32_t bit = 0; bit < kGroupBlocks; ++bit) {
-      const Int3 block = block_in_group(at, bit);
-      const BlockRef ref = has_id(group) ? map.groups[group].block[bit] : group;
-      BlockView seen = whole == BlockView::free ? whole : look(block, cube);
-      if (seen > BlockView::free) seen = look_closely(block, seen, voxels);
-      if (seen != BlockView::nothing) add(1ull << bit, seen, block, ref, voxels, view);
-    }
+    const GroupLook group = look_at_group(at);
+    view.archived = group.archived;
+    for (int32_t bit = 0; group.blocks_matter && bit < kGroupBlocks; ++bit)
+      look_at_block(at, group, bit, voxels, view);
     return view;
+  }
+
+  /// What the frame says of a group as a whole.
+  struct GroupLook {
+    BlockRef ref;                  ///< of the group
+    BlockView whole;               ///< for all of its blocks
+    bool blocks_matter;            ///< false: nothing is new about any of them
+    BlockRef archived = kNoBlock;  ///< see GroupView
+  };
+  STILLMAP_HD GroupLook look_at_group(Int3 at) const {
+    const BlockRef ref = map.table.find(pack(at));
+    // Nothing is told to a group that is away: what it held is not to be made anew beside it.
+    if (is_archived(ref)) return {ref, BlockView::nothing, false, comes_into_view(at) ? ref : kNoBlock};
+    const BlockView whole = look(block_in_group(at, 0), group_cube());
+    const bool nothing_new =
+        (whole == BlockView::free || whole == BlockView::free_if_measured) && settled(ref);
+    return {ref, whole, whole != BlockView::nothing && !nothing_new, kNoBlock};
+  }
+  /// Adds one block of a group whose blocks matter to `view`. On the GPU each block has its own view, and
+  /// their bits are put together.
+  template <class Voxels>
+  STILLMAP_HD void look_at_block(Int3 at, const GroupLook& group, int32_t bit, const Voxels& voxels,
+                                 GroupView& view) const {
+    const CubeGeometry cube = cube_geometry(kBlockEdge, map.voxel_m);
+    const Int3 block = block_in_group(at, bit);
+    const BlockRef ref = has_id(group.ref) ? map.groups[group.ref].block[bit] : group.ref;
+    BlockView seen = group.whole == BlockView::free ? group.whole : look(block, cube);
+    if (seen > BlockView::free) seen = look_closely(block, seen, voxels);
+    if (seen != BlockView::nothing) add(1ull << bit, seen, block, ref, voxels, view);
   }
 
   /// In view, or within `margin_m` of it.

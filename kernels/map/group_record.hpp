@@ -25,7 +25,7 @@ static_assert(sizeof(GroupRecordHead) == 208);
 constexpr uint32_t kSeenBytes = sizeof(SeenVoxels::layer);
 constexpr uint32_t kMaxGroupRecordBytes = sizeof(GroupRecordHead) + kGroupBlocks * sizeof(VoxelBlock);
 
-constexpr uint32_t payload_bytes(BlockKind kind) {
+STILLMAP_HD constexpr uint32_t payload_bytes(BlockKind kind) {
   return kind == BlockKind::voxels   ? static_cast<uint32_t>(sizeof(VoxelBlock))
          : kind == BlockKind::partly ? kSeenBytes
                                      : 0u;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernels/mask/carry_mask.hpp"
+
 namespace stillmap {
 namespace {
 
@@ -378,22 +380,12 @@ void decide_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory
 void carry_mask(const ImageView<const float>& depth_before_m, const ImageView<const uint8_t>& dynamic_before,
                 const Se3& T_now_before, const CellGrid& now) {
   std::fill_n(now.expected.data, now.expected.pixels(), uint8_t{0});
-  constexpr float kMovedM = 0.15f;  // towards or away from the camera since the last frame
+  const CarryMaskPass pass{depth_before_m, dynamic_before, T_now_before, now};
   for (int32_t r = 0; r < depth_before_m.rows; ++r)
-    for (int32_t c = 0; c < depth_before_m.cols; ++c) {
-      const float z_m = depth_before_m.at(r, c);
-      if (!dynamic_before.at(r, c) || z_m <= 0.0f) continue;
-      const Vec3 p = T_now_before * unproject(now.k, static_cast<float>(c), static_cast<float>(r), z_m);
-      if (p.z < kNearestM) continue;
-      const Pixel at = project(now.k, p);
-      const int32_t row = static_cast<int32_t>(std::floor(at.v)),
-                    col = static_cast<int32_t>(std::floor(at.u));
-      for (int32_t i = 0; i < 4; ++i) {  // the four cells around: no holes
-        const int32_t nr = row + (i >> 1), nc = col + (i & 1);
-        if (now.depth_m.contains(nr, nc) && std::fabs(now.depth_m.at(nr, nc) - p.z) < kMovedM)
-          now.expected.at(nr, nc) = std::max(now.expected.at(nr, nc), dynamic_before.at(r, c));
-      }
-    }
+    for (int32_t c = 0; c < depth_before_m.cols; ++c)
+      pass(r, c, [&](int32_t row, int32_t col, uint8_t dynamic) {
+        now.expected.at(row, col) = std::max(now.expected.at(row, col), dynamic);
+      });
 }
 
 }  // namespace stillmap

@@ -7,6 +7,20 @@
 
 namespace stillmap {
 
+/// Whether a view can be made: an image that is not empty nor wider than 32767 pixels, and a rotation. False
+/// also for what is not a number.
+inline bool is_view(const Se3& T_map_cam, const Intrinsics& k) {
+  constexpr int32_t kMaxViewEdge = 32767;
+  bool good = k.fx > 0 && k.fy > 0 && k.width >= 1 && k.height >= 1 && k.width <= kMaxViewEdge &&
+              k.height <= kMaxViewEdge;
+  for (int row = 0; row < 3; ++row) {
+    const Mat3& r = T_map_cam.rotation;
+    const Vec3 v = {r(row, 0), r(row, 1), r(row, 2)};
+    good = good && fabsf(dot(v, v) - 1.0f) < 0.01f;
+  }
+  return good;
+}
+
 /// One pixel of a view of the map. Both images have the size of `k`.
 struct RaycastPass {
   VolumeView map;

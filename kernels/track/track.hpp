@@ -1,11 +1,11 @@
 #pragma once
 
-// Levenberg-Marquardt over three sub-samplings (paper section III-B). Host code; an engine supplies the
-// passes.
+// A whole registration by the passes of an engine, and what it amounts to. Host code.
 
 #include "kernels/base/normal_eq.hpp"
 #include "kernels/engine.hpp"
 #include "kernels/params.hpp"
+#include "kernels/track/pose_search.hpp"
 
 namespace stillmap {
 
@@ -31,5 +31,8 @@ struct PassRunner {
 /// @thread the engine's caller
 TrackResult register_frame(const PassRunner& pass, const Se3& T_start, const TrackParams& params,
                            LevelRange levels, int32_t min_points, const PosePrior& prior = {});
+
+/// What a search that has come to its end amounts to; parameters as of register_frame.
+TrackResult result_of(const PoseSearch& search, const Se3& T_start, int32_t finest_level, int32_t min_points);
 
 }  // namespace stillmap

@@ -22,7 +22,13 @@ std::vector<NamedEngine> available_engines() {
   for (const CpuLoops* loops : runnable_loops())
     if (loops != &kLoopsBaseline)
       engines.push_back(cpu(std::string("cpu-") + loops->name, kRounding, *loops, 2));
+  if (!cuda_missing()) engines.push_back({"cuda", kRounding, make_cuda_engine});
   return engines;
+}
+
+std::string engines_left_out() {
+  const char* missing = cuda_missing();
+  return missing ? std::string("skip cuda: ") + missing : std::string();
 }
 
 }  // namespace stillmap::parity

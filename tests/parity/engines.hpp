@@ -53,5 +53,7 @@ struct NamedEngine {
 
 /// All that this build and this machine have. The first is the reference: plain loops, one thread.
 std::vector<NamedEngine> available_engines();
+/// One line on what cannot be compared here, and why; "" when all can.
+std::string engines_left_out();
 
 }  // namespace stillmap::parity

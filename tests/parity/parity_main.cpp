@@ -27,6 +27,7 @@ constexpr SceneToRun kScenes[] = {{"static", 0, false, 0.03}, {"crowd", 150, tru
 int run(int frames) {
   Report report;
   const std::vector<NamedEngine> engines = available_engines();
+  if (const std::string skipped = engines_left_out(); !skipped.empty()) std::printf("%s\n", skipped.c_str());
   Timer total;
   total.start();
   for (const SceneToRun& wanted : kScenes) {

@@ -4,8 +4,8 @@
 
 namespace stillmap::parity {
 
-Result<Scene> render_scene(const std::string& name, int first, int count) {
-  Result<std::unique_ptr<FrameSource>> source = open_synthetic(name + ",size=320x240,seconds=10");
+Result<Scene> render_scene(const std::string& name, int first, int count, const std::string& size) {
+  Result<std::unique_ptr<FrameSource>> source = open_synthetic(name + ",size=" + size + ",seconds=10");
   if (!source) return Error{source.error()};
   const SourceInfo& info = (*source)->info();
   Scene scene{name, info.camera, info.depth_units_per_m, false, {}};

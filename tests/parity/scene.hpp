@@ -32,7 +32,8 @@ struct Scene {
   }
 };
 
-/// Renders `count` frames of 320x240 from frame `first` on.
-Result<Scene> render_scene(const std::string& name, int first, int count);
+/// Renders `count` frames from frame `first` on. @param size "WxH"
+Result<Scene> render_scene(const std::string& name, int first, int count,
+                           const std::string& size = "320x240");
 
 }  // namespace stillmap::parity

@@ -26,6 +26,9 @@ Arena::Arena(uint64_t bytes, const char* dir) : size_(bytes) {
   if (file >= 0) close(file);
 }
 
+Arena::Arena(void* memory, uint64_t bytes)
+    : base_(static_cast<std::byte*>(memory)), owner_(false), size_(bytes) {}
+
 void Arena::map_memory(int flags, int file) {
   void* memory = mmap(nullptr, size_, PROT_READ | PROT_WRITE, flags, file, 0);
   failed_ = memory == MAP_FAILED;
@@ -33,7 +36,7 @@ void Arena::map_memory(int flags, int file) {
 }
 
 Arena::~Arena() {
-  if (base_) munmap(base_, size_);
+  if (base_ && owner_) munmap(base_, size_);
 }
 
 void* Arena::take_bytes(const char* name, uint64_t bytes) {

@@ -19,6 +19,8 @@ class Arena {
   explicit Arena(uint64_t bytes);
   /// The same in a file of its own in `dir`, already without a name: the system may move its pages there.
   Arena(uint64_t bytes, const char* dir);
+  /// Carves memory that belongs to somebody else, zeroed or of no meaning yet.
+  Arena(void* memory, uint64_t bytes);
   ~Arena();
   Arena(const Arena&) = delete;
   Arena& operator=(const Arena&) = delete;
@@ -46,6 +48,7 @@ class Arena {
   void note(const char* name, uint64_t bytes);
 
   std::byte* base_ = nullptr;
+  bool owner_ = true;
   uint64_t size_ = 0;
   uint64_t used_ = 0;
   bool failed_ = false;

@@ -12,6 +12,7 @@
 #include "kernels/backend/cpu/relocalise.hpp"
 #include "kernels/backend/cpu/thread_pool.hpp"
 #include "kernels/engine.hpp"
+#include "kernels/frame_rules.hpp"
 #include "kernels/mask/grow_mask.hpp"
 #include "kernels/mask/parts.hpp"
 #include "kernels/mask/slide.hpp"
@@ -21,74 +22,11 @@ namespace stillmap {
 namespace {
 
 constexpr int32_t kRowsPerTile = 16;  ///< of the finest level; a multiple of the coarsest step
-constexpr int32_t kLongestStep = 4;   ///< of the finest level; that of the coarsest is four times as long
 constexpr uint32_t kGroupsPerTile = 16;
 constexpr uint32_t kBlocksPerTile = 32;
-/// Frames kept to see what slides; the oldest is mask.reabsorb_s old, or a third more.
-constexpr int32_t kEarlier = 4;
 
-/// A length or count of 640x480 pixels, scaled to the image.
-int32_t scaled_px(int32_t px_at_640, int32_t width) {
-  return static_cast<int32_t>(std::lround(static_cast<double>(px_at_640) * width / 640.0));
-}
-int32_t scaled_pixels(int32_t pixels_at_vga, const Intrinsics& k) {
-  return static_cast<int32_t>(static_cast<double>(pixels_at_vga) * k.width * k.height / (640.0 * 480.0));
-}
 uint32_t tiles_of(int32_t length, int32_t tile) {
   return static_cast<uint32_t>((length + tile - 1) / tile);
-}
-
-/// Farthest that a frame can change the map, along the optical axis.
-float far_plane_m(const EngineParams& p) {
-  return std::max(p.integrate.free_max_m, p.depth.max_m) + p.map.truncation_m;
-}
-
-/// From the camera to the corner of its view at the far plane: no view box is longer than twice this.
-float reach_m(const EngineParams& p) {
-  const Intrinsics& k = p.camera.k;
-  const float x = std::max(std::fabs(k.cx), std::fabs(static_cast<float>(k.width) - k.cx)) / k.fx;
-  const float y = std::max(std::fabs(k.cy), std::fabs(static_cast<float>(k.height) - k.cy)) / k.fy;
-  return far_plane_m(p) * std::sqrt(1.0f + x * x + y * y);
-}
-
-/// At the finest level of the registration: 1: every pixel; n: every n-th one of every n-th row.
-int32_t finest_step(const EngineParams& p) {
-  int32_t step = 1;
-  while (p.track.sample_cols > 0 && step < kLongestStep && p.camera.k.width > step * p.track.sample_cols)
-    step *= 2;
-  return step;
-}
-
-/// Neighbouring points err together, the more of them the finer the samples.
-float correlated_points(const EngineParams& p) {
-  const float pixels = static_cast<float>(p.camera.k.width) * static_cast<float>(p.camera.k.height);
-  const auto step = static_cast<float>(finest_step(p));
-  return std::max(1.0f, p.track.correlated_points * pixels / (640.0f * 480.0f * step * step));
-}
-
-float group_m(const MapParams& map) {
-  return map.voxel_m * static_cast<float>(kBlockEdge * kGroupEdge);
-}
-
-/// Groups that the largest view box can hold: its edges are at most the view's longest diagonal.
-uint64_t max_groups(const EngineParams& p) {
-  const auto edge =
-      static_cast<uint64_t>(std::ceil((1.2f * reach_m(p) + 2.0f * p.fetch_m) / group_m(p.map))) + 3;
-  return edge * edge * edge;
-}
-
-/// Each block with voxels once, and each that was seen in part.
-uint64_t max_visible(const EngineParams& p) {
-  return 2 * static_cast<uint64_t>(p.map.pool_blocks);
-}
-
-PointState point_state(const VolumeView& map, Vec3 p_map, BlockCache& cache) {
-  const float inv = 1.0f / map.voxel_m;
-  const auto nearest = [&](float x_m) { return static_cast<int32_t>(std::floor(x_m * inv + 0.5f)); };
-  const Int3 voxel = {nearest(p_map.x), nearest(p_map.y), nearest(p_map.z)};
-  const BlockAt block = lookup(map, pack(block_of_voxel(voxel)), cache);
-  const int16_t sdf = block ? block.surface(index_in_block(voxel)).sdf : kSdfUnobserved;
-  return sdf == kSdfUnobserved ? PointState::unknown : sdf > 0 ? PointState::free : PointState::occupied;
 }
 
 /// Everything that lives as long as the engine.
@@ -368,29 +306,10 @@ void CpuEngine::set_nothing_masked() {
 }
 
 TrackPass CpuEngine::track_pass(const Se3& T_map_cam) const {
-  TrackPass pass;
-  pass.map = memory_.map.view();
+  TrackPass pass = track_pass_at(params_, memory_.map.view(), T_map_cam);
   pass.depth_m = memory_.depth_m;
   pass.colour = memory_.luma_chroma;
-  pass.k = k();
-  pass.T_map_cam = T_map_cam;
-  pass.max_m = params_.depth.max_m;
-  const TrackParams& p = params_.track;
-  pass.weights = {pass.map.sdf_unit_m(), 1.0f / params_.map.voxel_m, p.colour_weight, p.inlier_m, p.kernel};
   return pass;
-}
-
-/// The kernel of a level: wide where the picture is coarse and the pose not yet known well.
-void set_kernel(const EngineParams& params, int32_t step, TrackWeights& weights) {
-  const TrackParams& p = params.track;
-  constexpr float kSquared_m = 1e9f;
-  if (p.kernel == RobustKernel::huber) {
-    weights.kernel_m = p.huber_depth_m > 0 ? p.huber_depth_m : kSquared_m;
-    return;
-  }
-  weights.kernel_m = step >= 4 ? p.kernel_coarse_m : step == 2 ? p.kernel_middle_m : p.kernel_fine_m;
-  weights.kernel_m += p.kernel_sigmas * params.depth.noise_m;
-  weights.kernel_per_range2 = p.kernel_sigmas * params.depth.noise_per_m2;
 }
 
 TrackResult CpuEngine::track(const Se3& T_start, const PosePrior& prior) {
@@ -428,12 +347,6 @@ void CpuEngine::write_trust(ImageView<const uint8_t> mask, int32_t step) {
                        params_.track.probation_trust,
                        params_.map.mesh_min_surface};
   in_row_tiles(k().height, [&](int32_t first, int32_t last) { loops_.trust(pass, first, last, step); });
-}
-
-/// The pose of the camera after an increment about its centre (see TrackPass).
-Se3 moved_about_centre(const Se3& T_map_cam, const Twistd& motion) {
-  const Se3d T = cast<double>(T_map_cam), turn = exp(Twistd{{}, motion.w});
-  return cast<float>(Se3d{orthonormalized(turn.rotation * T.rotation), T.translation + motion.v});
 }
 
 void CpuEngine::mask_by_parts(const Se3& T_map_cam) {
@@ -595,13 +508,9 @@ void CpuEngine::update_static_depth() {
   pool_.for_each(static_cast<uint32_t>(pass.tiles.rows),
                  [&](uint32_t row) { loops_.static_depth(pass, static_cast<int32_t>(row)); });
   for (int32_t l = 1; l < ranges.levels; ++l) {
-    const ImageView<DepthRange> fine = ranges.level[l - 1], coarse = ranges.level[l];
-    for (int32_t r = 0; r < coarse.rows; ++r)
-      for (int32_t c = 0; c < coarse.cols; ++c) {
-        const int32_t r1 = std::min(2 * r + 1, fine.rows - 1), c1 = std::min(2 * c + 1, fine.cols - 1);
-        coarse.at(r, c) = merged(merged(fine.at(2 * r, 2 * c), fine.at(2 * r, c1)),
-                                 merged(fine.at(r1, 2 * c), fine.at(r1, c1)));
-      }
+    const MergeRangesPass merge{ranges.level[l - 1], ranges.level[l]};
+    for (int32_t r = 0; r < merge.coarse.rows; ++r)
+      for (int32_t c = 0; c < merge.coarse.cols; ++c) merge(r, c);
   }
 }
 
@@ -610,26 +519,13 @@ VisibleGroupPass CpuEngine::visible_pass(const Se3& T_map_cam, const FrameGeomet
   const DepthRangePyramid& ranges = memory_.ranges;
   const float farthest_m = std::min(
       far_plane_m(params_), ranges.level[ranges.levels - 1].at(0, 0).max_m + params_.map.truncation_m);
-  Vec3 low = T_map_cam.translation, high = low;
-  for (int32_t corner = 0; corner < 4; ++corner) {
-    const float u = corner & 1 ? static_cast<float>(k().width) : -1.0f;
-    const float v = corner & 2 ? static_cast<float>(k().height) : -1.0f;
-    const Vec3 p = T_map_cam * unproject(k(), u, v, farthest_m);
-    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-  }
-  const float around_m = params_.fetch_m, inv = 1.0f / group_m(params_.map);
-  low = low - Vec3{around_m, around_m, around_m};
-  high = high + Vec3{around_m, around_m, around_m};
-  const auto cell = [&](float x) { return static_cast<int32_t>(std::floor(x * inv)); };
-  const Int3 first = {cell(low.x), cell(low.y), cell(low.z)},
-             last = {cell(high.x), cell(high.y), cell(high.z)};
+  const GroupBox box = box_around_view(T_map_cam, k(), farthest_m, params_.fetch_m, group_m(params_.map));
   return {memory_.map.view(),
           geometry,
           ranges,
           inverse(T_map_cam),
-          first,
-          {last.x - first.x + 1, last.y - first.y + 1, last.z - first.z + 1},
+          box.first,
+          box.groups,
           params_.integrate.free_space,
           dense(),
           static_cast<uint32_t>(params_.integrate.weight_cap),

@@ -1,31 +1,13 @@
 #include "kernels/backend/cpu/map_storage.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cstring>
 
 #include "kernels/integrate/integrate_pass.hpp"
+#include "kernels/map/map_sizes.hpp"
 
 namespace stillmap {
 namespace {
-
-// Surfaces fill a third of the groups they are in; the rest is for the rim of what was seen.
-constexpr uint64_t kBlocksPerGroup = 4;
-constexpr uint64_t kFewestGroups = 1024;
-/// The rim of a view runs through the middle of rooms: nearly as many blocks as surfaces have, of 80 bytes
-/// each.
-constexpr uint64_t kPartlyPerBlock = 1;
-/// Groups that are free throughout, or in the archive, take a slot and nothing else.
-constexpr uint64_t kSlotsPerBlock = 2;
-constexpr uint64_t kFewestSlots = 16;
-
-uint32_t table_slots(uint64_t pool_blocks) {
-  return static_cast<uint32_t>(std::bit_ceil(std::max(kSlotsPerBlock * pool_blocks, kFewestSlots)));
-}
-/// Chains stay short.
-uint32_t most_entries(uint32_t slots) {
-  return slots / 2;
-}
 
 void fill_voxels(VoxelBlock& block, VoxelSurface surface, VoxelRecord record) {
   std::fill_n(block.surface, kBlockVoxels, surface);
@@ -37,30 +19,6 @@ VoxelRecord seen_often(uint32_t looks) {
   return record;
 }
 
-float distance2(Vec3 centre_map, BlockKey group, float voxel_m) {
-  constexpr int32_t half = kGroupEdge * kBlockEdge / 2;
-  const Vec3 d =
-      voxel_position(first_voxel(block_in_group(unpack(group), 0)) + Int3{half, half, half}, voxel_m) -
-      centre_map;
-  return dot(d, d);
-}
-
-/// False: no record, or one that does not hold what its head says.
-bool read_head(View<const uint8_t> record, GroupRecordHead& head) {
-  if (record.size < sizeof head) return false;
-  std::memcpy(&head, record.data, sizeof head);
-  uint32_t bytes = sizeof head;
-  for (int32_t i = 0; i < kGroupBlocks; ++i) {
-    const auto kind = static_cast<BlockKind>(head.kind[i]);
-    if (kind > BlockKind::partly || (head.uniform_looks > 0 && kind != BlockKind::unknown)) return false;
-    const bool looked_at = kind == BlockKind::free || kind == BlockKind::partly;
-    if (looked_at != (head.looks[i] > 0) || head.settled[i] > kNoSurfaceLeft) return false;
-    bytes += payload_bytes(kind);
-  }
-  return head.bytes == bytes && record.size == bytes && head.uniform_looks <= 255 &&
-         head.group == pack(unpack(head.group));
-}
-
 void fill_pool(const PoolView& pool) {
   for (uint32_t i = 0; i < pool.free_ids.size; ++i) pool.free_ids[i] = i;
   *pool.used = 0;
@@ -69,18 +27,14 @@ void fill_pool(const PoolView& pool) {
 }  // namespace
 
 void MapStorage::carve(Arena& arena, const MapParams& params, int32_t weight_cap) {
-  const uint64_t blocks = static_cast<uint64_t>(params.pool_blocks);
-  const uint64_t groups = std::max(blocks / kBlocksPerGroup, std::min(blocks, kFewestGroups));
-  const uint64_t partly =
-      params.free_space == FreeSpace::hierarchical ? blocks * kPartlyPerBlock : uint64_t{0};
-  const uint32_t slots = table_slots(blocks);
+  const auto [blocks, groups, partly, slots] = map_sizes(params);
   view_.voxel_m = params.voxel_m;
   view_.truncation_m = params.truncation_m;
   view_.mesh_min_weight = params.mesh_min_weight;
   view_.mesh_min_surface = params.mesh_min_surface;
   view_.table.keys = arena.take<BlockKey>("map: table", slots);
   view_.table.blocks = arena.take<BlockRef>("map: table", slots);
-  order_ = arena.take<TableEntry>("map: table", slots);
+  order_ = arena.take<GroupEntry>("map: table", slots);
   view_.groups = arena.take<BlockGroup>("map: groups of blocks", groups);
   view_.group_pool.free_ids = arena.take<BlockId>("map: groups of blocks", groups);
   view_.blocks = arena.take<VoxelBlock>("map: voxel blocks", blocks);
@@ -394,13 +348,9 @@ bool MapStorage::above_high_water() const {
 }
 
 uint32_t MapStorage::farthest_of_order(Vec3 centre_map, uint32_t count, View<BlockKey> keys) {
-  const auto farther = [&](const TableEntry& a, const TableEntry& b) {
-    const float da = distance2(centre_map, a.key, view_.voxel_m),
-                db = distance2(centre_map, b.key, view_.voxel_m);
-    return da != db ? da > db : a.key > b.key;
-  };
   const uint32_t wanted = std::min(count, keys.size);
-  std::partial_sort(order_.begin(), order_.begin() + wanted, order_.begin() + count, farther);
+  std::partial_sort(order_.begin(), order_.begin() + wanted, order_.begin() + count,
+                    FartherGroup{centre_map, view_.voxel_m});
   for (uint32_t i = 0; i < wanted; ++i) keys[i] = order_[i].key;
   return wanted;
 }
@@ -427,7 +377,7 @@ uint32_t MapStorage::order_groups() {
   uint32_t count = 0;
   for (uint32_t slot = 0; slot < view_.table.keys.size; ++slot)
     if (view_.table.keys[slot] != kEmptyKey && view_.table.blocks[slot] != kNoBlock)
-      order_[count++] = {view_.table.keys[slot], view_.table.blocks[slot], false};
+      order_[count++] = {view_.table.keys[slot], view_.table.blocks[slot], 0};
   return count;
 }
 
@@ -442,7 +392,7 @@ void MapStorage::remove(BlockRef block) {
   }
 }
 
-void MapStorage::give_up(const TableEntry& group) {
+void MapStorage::give_up(const GroupEntry& group) {
   health_.archived_groups -= is_archived(group.ref);
   health_.dropped_blocks += is_archived(group.ref);  // one at least
   if (!has_id(group.ref)) return;
@@ -454,22 +404,12 @@ void MapStorage::give_up(const TableEntry& group) {
 }
 
 void MapStorage::drop_ordered(Vec3 centre_map, uint32_t groups) {
-  const auto room = [](uint32_t used, uint32_t capacity) { return used <= capacity - capacity / 10; };
-  // What goes first stands last: groups with blocks, unless it is the table that is full; of those what is
-  // out of view, and of that the farthest. Ties by key: the same groups go whatever their order in the table.
-  const bool any_kind = !room(groups, most_entries(view_.table.keys.size));
-  const auto nearer = [&](const TableEntry& a, const TableEntry& b) {
-    if (!any_kind && has_id(a.ref) != has_id(b.ref)) return has_id(b.ref);
-    if (a.in_view != b.in_view) return a.in_view;
-    const float da = distance2(centre_map, a.key, view_.voxel_m),
-                db = distance2(centre_map, b.key, view_.voxel_m);
-    return da != db ? da < db : a.key < b.key;
-  };
-  std::sort(order_.begin(), order_.begin() + groups, nearer);
-  while (groups > 0 &&
-         !(room(used_[0], view_.pool.free_ids.size) && room(used_[1], view_.group_pool.free_ids.size) &&
-           room(used_[2], view_.partly_pool.free_ids.size) &&
-           room(groups, most_entries(view_.table.keys.size))))
+  const bool any_kind = !has_room(groups, most_entries(view_.table.keys.size));
+  std::sort(order_.begin(), order_.begin() + groups, KeptLonger{{centre_map, view_.voxel_m}, any_kind});
+  while (groups > 0 && !(has_room(used_[0], view_.pool.free_ids.size) &&
+                         has_room(used_[1], view_.group_pool.free_ids.size) &&
+                         has_room(used_[2], view_.partly_pool.free_ids.size) &&
+                         has_room(groups, most_entries(view_.table.keys.size))))
     give_up(order_[--groups]);
   rebuild_table(groups);
 }

@@ -4,6 +4,7 @@
 
 #include "kernels/backend/cpu/arena.hpp"
 #include "kernels/engine.hpp"
+#include "kernels/map/group_order.hpp"
 #include "kernels/map/group_record.hpp"
 #include "kernels/map/volume_view.hpp"
 
@@ -74,13 +75,6 @@ class MapStorage {
   }
 
  private:
-  /// A group as drop_farthest moves it about.
-  struct TableEntry {
-    BlockKey key;
-    BlockRef ref;
-    bool in_view;
-  };
-
   /// @return null when there is no room
   BlockRef* open(Int3 block);
   BlockGroup* open_group(Int3 group);
@@ -91,7 +85,7 @@ class MapStorage {
   void drop_ordered(Vec3 centre_map, uint32_t groups);
   uint32_t farthest_of_order(Vec3 centre_map, uint32_t count, View<BlockKey> keys);
   void remove(BlockRef block);
-  void give_up(const TableEntry& group);
+  void give_up(const GroupEntry& group);
   void rebuild_table(uint32_t groups);
   void note_peak();
   uint64_t bytes_in_use() const;
@@ -100,7 +94,7 @@ class MapStorage {
   VolumeView view_;
   View<VoxelBlock> free_block_;  ///< one
   View<uint32_t> used_;          ///< taken from the pools of voxels, groups, partly seen blocks
-  View<TableEntry> order_;       ///< scratch of drop_farthest
+  View<GroupEntry> order_;       ///< scratch of drop_farthest
   uint32_t table_entries_ = 0;
   uint32_t enough_ = 64;
   float high_water_ = 1;

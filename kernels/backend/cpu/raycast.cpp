@@ -10,19 +10,8 @@ namespace {
 constexpr int32_t kSquarePx = 8;
 constexpr int32_t kRowsPerTask = 16;
 constexpr uint32_t kBlocksPerTask = 256;
-constexpr int32_t kMaxViewEdge = 32767;
-
 bool has_size(int32_t rows, int32_t cols, const Intrinsics& k) {
   return rows == k.height && cols == k.width;
-}
-
-/// False also for what is not a number.
-bool is_rotation(const Mat3& r) {
-  for (int row = 0; row < 3; ++row) {
-    const Vec3 v = {r(row, 0), r(row, 1), r(row, 2)};
-    if (!(std::fabs(dot(v, v) - 1.0f) < 0.01f)) return false;
-  }
-  return true;
 }
 
 /// @return views of the tiles of ranges, all empty
@@ -52,10 +41,9 @@ uint64_t raycast_scratch_bytes() {
 
 Status raycast(RaycastPass pass, View<uint8_t> scratch, ThreadPool& threads) {
   const Intrinsics& k = pass.k;
-  if (!(k.fx > 0 && k.fy > 0) || k.width < 1 || k.height < 1 || k.width > kMaxViewEdge ||
-      k.height > kMaxViewEdge || !has_size(pass.depth_m.rows, pass.depth_m.cols, k) ||
-      !has_size(pass.colour.rows, pass.colour.cols, k) || !is_rotation(pass.T_map_cam.rotation) ||
-      !scratch.data || scratch.size < raycast_scratch_bytes())
+  if (!is_view(pass.T_map_cam, k) || !has_size(pass.depth_m.rows, pass.depth_m.cols, k) ||
+      !has_size(pass.colour.rows, pass.colour.cols, k) || !scratch.data ||
+      scratch.size < raycast_scratch_bytes())
     return Status::out_of_range;
   pass.ranges = empty_ranges(k, reinterpret_cast<RayRange*>(scratch.data));
   const RayRangesPass ranges{pass.map, k, inverse(pass.T_map_cam), pass.near_m, pass.far_m, pass.ranges};
