@@ -4,11 +4,12 @@
 
 namespace stillmap {
 
-std::string pick_device(const std::string& wanted) {
+std::string pick_device(const std::string& wanted, bool quiet) {
   if (wanted == "cpu") return "cpu";
   const char* missing = cuda_missing();
   if (!missing) return "cuda";
-  if (cuda_is_built()) std::fprintf(stderr, "stillmap: no CUDA device (%s); the CPU engine runs\n", missing);
+  if (cuda_is_built() && !quiet)
+    std::fprintf(stderr, "stillmap: no CUDA device (%s); the CPU engine runs\n", missing);
   return "cpu";
 }
 

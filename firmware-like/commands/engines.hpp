@@ -8,9 +8,10 @@
 namespace stillmap {
 
 /// What --device picks: "cuda" where the program has the engine and a device answers, else "cpu". With "auto"
-/// a program that has the engine says once, on stderr, why it does not take it.
+/// a program that has the engine says once, on stderr, why it does not take it,
+/// unless it is to be quiet.
 /// @param wanted auto, cuda or cpu; see cuda_refused for cuda  @thread boot
-std::string pick_device(const std::string& wanted);
+std::string pick_device(const std::string& wanted, bool quiet);
 
 /// Why `--device cuda` cannot be had here, and what to do; "" when it can, or is not asked for.  @thread boot
 std::string cuda_refused(const std::string& wanted);

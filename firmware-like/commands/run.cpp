@@ -119,7 +119,7 @@ int run(const RunOptions& o, FrameObserver* observer) {
   source.skip(o.skip_frames);
 
   const EngineParams params = engine_params(config, source.info().camera, source.info().depth_units_per_m);
-  const std::string device = pick_device(o.device);
+  const std::string device = pick_device(o.device, o.quiet);
   const MemoryPlan memory = plan_memory(config, params, device);
   if (const auto fits = check_budget(memory); !fits) return fail(fits.error(), fits.error_kind());
   const std::unique_ptr<Engine> engine = make_engine(device, params);

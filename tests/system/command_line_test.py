@@ -137,9 +137,9 @@ class Usage(Case):
         if os.path.exists("/dev/nvidiactl") or os.path.exists("/dev/nvgpu"):
             self.skipTest("this machine may have one")
         self.refused(2, "run", "--source", SMALL, "--device", "cuda", says=["--device cuda", "--device auto"])
-        done = stillmap("run", "--source", SMALL, "--device", "auto", "--max-frames", "2", "--quiet")
+        done = stillmap("run", "--source", SMALL, "--device", "auto", "--max-frames", "2")
         self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertLessEqual(done.stderr.count("CUDA"), 2, done.stderr)  # one line, which may name it twice
+        self.assertLessEqual(done.stderr.count("the CPU engine runs"), 1, done.stderr)
 
     def test_configuration(self):
         config = self.folder / "c.toml"
