@@ -5,11 +5,15 @@
 namespace stillmap {
 
 std::string pick_device(const std::string& wanted, bool quiet) {
-  if (wanted == "cpu") return "cpu";
+  if (wanted != "auto") return wanted;
   const char* missing = cuda_missing();
-  if (!missing) return "cuda";
-  if (cuda_is_built() && !quiet)
+  if (!cuda_is_built() || quiet) return "cpu";
+  if (missing)
     std::fprintf(stderr, "stillmap: no CUDA device (%s); the CPU engine runs\n", missing);
+  else  // until toolchain/gpu_check.sh has passed on a device
+    std::fprintf(
+        stderr,
+        "stillmap: the CPU engine runs; the CUDA engine has not been proven yet, --device cuda takes it\n");
   return "cpu";
 }
 

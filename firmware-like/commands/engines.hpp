@@ -7,9 +7,9 @@
 
 namespace stillmap {
 
-/// What --device picks: "cuda" where the program has the engine and a device answers, else "cpu". With "auto"
-/// a program that has the engine says once, on stderr, why it does not take it,
-/// unless it is to be quiet.
+/// What --device picks: cpu or cuda as it says; with "auto" the CPU engine, as long as the CUDA engine has
+/// not been proven on a device. A program that has the CUDA engine then says once, on stderr, why it does not
+/// take it, unless it is to be quiet.
 /// @param wanted auto, cuda or cpu; see cuda_refused for cuda  @thread boot
 std::string pick_device(const std::string& wanted, bool quiet);
 
