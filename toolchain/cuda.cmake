@@ -23,6 +23,8 @@ elseif(NOT STILLMAP_CUDA STREQUAL OFF)
   else()
     get_filename_component(nvcc_dir "${STILLMAP_NVCC}" REALPATH)
     get_filename_component(nvcc_dir "${nvcc_dir}" DIRECTORY)
+    # For another host's compiler, which nvcc does not tell by itself.
+    get_filename_component(STILLMAP_CUDA_INCLUDE "${nvcc_dir}/../include" ABSOLUTE)
     find_library(STILLMAP_CUDART cudart_static HINTS ${nvcc_dir}/../lib64 ${nvcc_dir}/../lib
       ${nvcc_dir}/../targets/${CMAKE_SYSTEM_PROCESSOR}-linux/lib ${nvcc_dir}/../targets/sbsa-linux/lib)
     if(STILLMAP_CUDART)

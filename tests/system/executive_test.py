@@ -108,21 +108,20 @@ class Service(Case):
         self.addCleanup(self.notify.close)
         self.notify.bind(str(self.folder / "notify"))
         self.notify.settimeout(PATIENCE_S)
+        self.heard = []
         self.environment = {"NOTIFY_SOCKET": str(self.folder / "notify"), "WATCHDOG_USEC": "600000"}
 
-    def hear(self, *messages):
-        """One of them."""
+    def hear(self, *messages, times=1):
+        """One of them, so often since the start."""
         end = time.monotonic() + PATIENCE_S
-        while time.monotonic() < end:
-            if set(messages) & set(self.notify.recv(4096).decode().splitlines()):
-                return
-        self.fail(f"not heard: {messages}")
+        while sum(self.heard.count(m) for m in messages) < times:
+            self.assertLess(time.monotonic(), end, f"not heard: {messages}; but {self.heard}")
+            self.heard += self.notify.recv(4096).decode().splitlines()
 
     def test_readiness_watchdog_and_stop(self):
         process = self.start("--source", SCENE, "--realtime", *QUICK, environment=self.environment)
         self.hear("READY=1")
-        for _ in range(3):
-            self.hear("WATCHDOG=1")
+        self.hear("WATCHDOG=1", times=3)
         self.hear("STATUS=running", "STATUS=degraded", "STATUS=lost")  # a busy machine may be late
         process.send_signal(signal.SIGTERM)
         self.hear("STOPPING=1")

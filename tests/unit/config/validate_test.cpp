@@ -149,8 +149,6 @@ TEST(Validate, TheLogHasRoomForTwoFilesAndFramesNeedIt) {
 TEST(Validate, PartsOfOtherBuildsAreNamed) {
   EXPECT_TRUE(mentions(after([](Config& c) { c.depth.invalid = InvalidDepth::complete; }),
                        "depth.invalid = complete is not part of this build"));
-  EXPECT_TRUE(
-      mentions(after([](Config& c) { c.record.log = true; }), "record.log = true is not part of this build"));
 }
 
 TEST(CameraProblem, NamesWhatIsWrong) {
