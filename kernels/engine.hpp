@@ -23,10 +23,10 @@ struct EngineParams {
   IntegrateParams integrate;
   MapParams map;
   RelocaliseParams relocalise;
-  int32_t threads = 2;                  ///< CPU engine: 1..64, the calling thread included
+  int32_t threads = 2;  ///< CPU engine: 1..64, the calling thread included
   /// CPU engine: called by each worker, with true when it starts and with false before it ends; may be null.
   void (*on_worker)(bool starts) = nullptr;
-  float fetch_m = 0;                    ///< with an archive: so near to the view its groups are wanted back
+  float fetch_m = 0;  ///< with an archive: so near to the view its groups are wanted back
 };
 
 /// One line of the memory plan.

@@ -12,7 +12,8 @@ namespace stillmap {
 class ThreadPool {
  public:
   /// @param threads 1..64, the caller included; cut to that
-  /// @param on_worker called by each worker, with true when it starts and with false before it ends; may be null
+  /// @param on_worker called by each worker, with true when it starts and with false before it ends; may be
+  /// null
   /// @thread boot
   explicit ThreadPool(int32_t threads, void (*on_worker)(bool starts) = nullptr);
   ~ThreadPool();
