@@ -16,6 +16,9 @@ struct CameraConfig {
   float fx = 0, fy = 0, cx = 0, cy = 0;
   float k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;
   float depth_units_per_m = 0;
+  std::string calibration;
+  bool auto_exposure = true;
+  bool auto_white_balance = true;
 
   template <class F>
   static void fields(F&& f) {
@@ -30,6 +33,11 @@ struct CameraConfig {
     f("p2", &P::p2, -1, 1, "1", "ours", "Brown-Conrady, used with fx");
     f("k3", &P::k3, -10, 10, "1", "ours", "Brown-Conrady, used with fx");
     f("depth_units_per_m", &P::depth_units_per_m, 0, 1e6, "units/m", "ours", "0: from the source");
+    f("calibration", &P::calibration, 0, 4000, "TOML file", "ours",
+      "intrinsics, extrinsics, depth scale and bias; empty: what the source says; the keys above override "
+      "it");
+    f("auto_exposure", &P::auto_exposure, 0, 1, "bool", "ours", "cameras: of the colour image");
+    f("auto_white_balance", &P::auto_white_balance, 0, 1, "bool", "ours", "cameras: of the colour image");
   }
 };
 
@@ -38,6 +46,12 @@ struct SourceConfig {
   float stall_s = 1;
   float time_offset_ms = 0;
   float max_pair_ms = 20;
+  int32_t cols = 640;
+  int32_t rows = 480;
+  float rate_hz = 30;
+  float gone_s = 5;
+  float reopen_s = 0.5f;
+  float reopen_max_s = 10;
 
   template <class F>
   static void fields(F&& f) {
@@ -48,6 +62,14 @@ struct SourceConfig {
     f("time_offset_ms", &P::time_offset_ms, -1e4, 1e4, "ms", "ours",
       "added to the colour stamp before pairing");
     f("max_pair_ms", &P::max_pair_ms, 0, 1000, "ms", "ours", "largest distance of the stamps of a pair");
+    f("cols", &P::cols, 16, 4096, "pixels", "ours", "cameras: width that is asked for, of depth and colour");
+    f("rows", &P::rows, 16, 4096, "pixels", "ours", "cameras: height that is asked for");
+    f("rate_hz", &P::rate_hz, 1, 240, "Hz", "ours", "cameras: rate that is asked for");
+    f("gone_s", &P::gone_s, 0.1, 1e6, "s", "ours",
+      "cameras: no frame for so long, and it is closed and opened again");
+    f("reopen_s", &P::reopen_s, 0.05, 1e6, "s", "ours",
+      "cameras: wait before a camera that is gone is opened again; doubled with each failure");
+    f("reopen_max_s", &P::reopen_max_s, 0.05, 1e6, "s", "ours", "up to this");
   }
 };
 
@@ -87,6 +109,63 @@ struct OdometryConfig {
       "its error of direction, over the turn");
     f("sigma_rad_per_m", &P::sigma_rad_per_m, 0, 10.0, "rad/m", "ours",
       "its error of direction, over the way gone");
+  }
+};
+
+enum class SonarKind : uint8_t { none, hc_sr04, pulse_width };
+
+/// A sonar on GPIO lines for what is nearer than the camera can see (paper III-E).
+struct SonarConfig {
+  SonarKind kind = SonarKind::none;
+  std::string chip = "/dev/gpiochip0";
+  int32_t trigger_line = -1;
+  int32_t echo_line = -1;
+  int32_t stop_line = -1;
+  float rate_hz = 15;
+  float temperature_c = 20;
+  float pulse_us_per_m = 5800;
+  float min_m = 0.02f;
+  float max_m = 4.0f;
+  int32_t median = 3;
+  float beam_deg = 30;
+  /// Camera (optical) from sonar (looks along its z): place in metres, unit quaternion x y z w.
+  std::array<float, 7> T_cam_sonar = {0, -0.04f, 0, 0, 0, 0, 1};
+  float veto_m = 0.5f;
+  float stop_m = 0.25f;
+  float max_age_s = 0.25f;
+  float lost_s = 2;
+  float stuck_s = 1;
+
+  template <class F>
+  static void fields(F&& f) {
+    using P = SonarConfig;
+    f("kind", &P::kind, 0, 2, "none|hc_sr04|pulse_width", "III-E",
+      "hc_sr04: trigger and echo; pulse_width: the echo line alone says the distance (MaxBotix)");
+    f("chip", &P::chip, 0, 4000, "GPIO chip", "ours", "that its lines are on");
+    f("trigger_line", &P::trigger_line, -1, 1023, "line", "ours", "output, hc_sr04 only; -1: none");
+    f("echo_line", &P::echo_line, -1, 1023, "line", "ours", "input, both edges are stamped by the kernel");
+    f("stop_line", &P::stop_line, -1, 1023, "line", "ours",
+      "output, high while something is nearer than stop_m; -1: none");
+    f("rate_hz", &P::rate_hz, 0.1, 20, "Hz", "ours",
+      "hc_sr04: readings a second; an older echo must have died away");
+    f("temperature_c", &P::temperature_c, -40, 85, "degrees C", "ours", "of the air: the speed of sound");
+    f("pulse_us_per_m", &P::pulse_us_per_m, 100, 1e5, "us/m", "ours",
+      "pulse_width: MaxBotix XL 5800, LV 5787, HR 1000");
+    f("min_m", &P::min_m, 0, 10, "m", "ours", "nearer readings are not believed");
+    f("max_m", &P::max_m, 0.1, 20, "m", "ours", "an echo from farther away is none");
+    f("median", &P::median, 1, 15, "readings", "ours", "of the last so many; 1: each is taken as it comes");
+    f("beam_deg", &P::beam_deg, 1, 120, "degrees", "III-E", "full opening of its cone");
+    f("T_cam_sonar", &P::T_cam_sonar, -100, 100, "m and quaternion x y z w", "III-E",
+      "pose of the sonar, which looks along its z, in the optical frame of the camera");
+    f("veto_m", &P::veto_m, 0, 10, "m", "III-E",
+      "with a reading nearer than this, the nearest that the camera sees, no invalid pixel in its cone is "
+      "taken as far");
+    f("stop_m", &P::stop_m, 0, 10, "m", "ours", "a reading nearer than this says stop");
+    f("max_age_s", &P::max_age_s, 0.01, 10, "s", "ours",
+      "a reading speaks for frames that were taken at most so much earlier or later");
+    f("lost_s", &P::lost_s, 0.1, 1e6, "s", "ours", "no echo for so long is the fault range_lost");
+    f("stuck_s", &P::stuck_s, 0.1, 1e6, "s", "ours",
+      "an echo line that does not move for so long is the fault range_stuck");
   }
 };
 
@@ -152,6 +231,18 @@ struct RecordConfig {
     f("snapshots", &P::snapshots, 0, 1000, "frames", "Fig. 1",
       "frames kept with mask and reprojected map for `stillmap picture`");
     f("keep_previous", &P::keep_previous, 0, 100, "runs", "ours", "earlier runs kept in DIR/previous-N");
+  }
+};
+
+/// What is done with a frame.
+struct PipelineConfig {
+  bool mapping = true;
+
+  template <class F>
+  static void fields(F&& f) {
+    using P = PipelineConfig;
+    f("mapping", &P::mapping, 0, 1, "bool", "ours",
+      "false: poses in the map of --map, or of the first frame; nothing is added to it");
   }
 };
 
@@ -249,6 +340,8 @@ struct Config {
   SourceConfig source;
   MountConfig mount;
   OdometryConfig odometry;
+  SonarConfig sonar;
+  PipelineConfig pipeline;
   DepthParams depth;
   TrackParams track;
   MaskParams mask;
@@ -271,6 +364,8 @@ struct Config {
     f("source", &Config::source);
     f("mount", &Config::mount);
     f("odometry", &Config::odometry);
+    f("sonar", &Config::sonar);
+    f("pipeline", &Config::pipeline);
     f("depth", &Config::depth);
     f("track", &Config::track);
     f("mask", &Config::mask);

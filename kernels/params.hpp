@@ -21,6 +21,7 @@ struct DepthParams {
   float max_m = 5.0f;
   InvalidDepth invalid = InvalidDepth::ignore;
   int32_t complete_frames = 10;
+  float far_m = 10.0f;
   int32_t min_valid_pixels = 3000;
   float noise_m = 0.001f;
   float noise_per_m2 = 0.0015f;
@@ -36,6 +37,8 @@ struct DepthParams {
       "zeros are ignored, or filled from a temporary model");
     f("complete_frames", &P::complete_frames, 2, 60, "frames", "III-E, IV-A",
       "frames of the temporary model");
+    f("far_m", &P::far_m, 0.1, 65.0, "m", "III-E",
+      "what stays invalid after completion is taken to be so far away");
     f("min_valid_pixels", &P::min_valid_pixels, 10, 1e7, "pixels of 640x480", "ours",
       "with fewer (scaled to the image size) a frame neither moves the pose nor touches the map");
     f("noise_m", &P::noise_m, 0, 0.1, "m", "ours", "standard deviation of a measurement close by");

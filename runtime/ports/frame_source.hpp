@@ -37,6 +37,7 @@ struct RgbdFrame {
   ImageView<uint8_t> truth_mask;  ///< kTrulyDynamic, kPutDown or 0; only when SourceInfo::has_truth_mask,
                                   ///< else no data
   std::optional<Se3d> truth_T_world_cam;  ///< source's world; only where the source knows it
+  float sonar_m = 0;  ///< a valid reading of the near range that comes with the frame; 0: none
 };
 
 struct SourceInfo {
@@ -68,6 +69,14 @@ class FrameSource {
 
   /// Odometry that comes with the frames; null where there is none. Lives as long as the source.
   virtual OdometryPort* odometry() { return nullptr; }
+
+  /// A camera: frames come at their own pace, and one that is gone may come back.
+  virtual bool live() const { return false; }
+
+  /// Closes a camera that is gone and tries to open it again, once. May allocate and take seconds.
+  /// @return ok: `next` goes on, stamps still rise; unavailable: it is not there, `error()` says what to do
+  /// @thread the reader thread
+  virtual Status reopen() { return Status::unavailable; }
 
   /// Passes over `count` frames without decoding them.
   virtual void skip(uint32_t count) = 0;
