@@ -81,9 +81,8 @@ Result<Done> apply_camera(Config& config, const std::string& text) {
   if (!values || values->size() < 4 || values->size() > 9)
     return usage("--camera " + text + ": expected FX,FY,CX,CY[,K1,K2,P1,P2,K3], four to nine finite numbers");
   CameraConfig& c = config.camera;
-  c = {.depth_units_per_m = c.depth_units_per_m};
   float* const fields[] = {&c.fx, &c.fy, &c.cx, &c.cy, &c.k1, &c.k2, &c.p1, &c.p2, &c.k3};
-  for (size_t i = 0; i < values->size(); ++i) *fields[i] = (*values)[i];
+  for (size_t i = 0; i < std::size(fields); ++i) *fields[i] = i < values->size() ? (*values)[i] : 0;
   if (c.fx <= 0 || c.fy <= 0)
     return usage("--camera " + text + ": the focal lengths FX and FY must be greater than 0 pixels");
   return Done{};
