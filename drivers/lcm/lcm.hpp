@@ -33,20 +33,13 @@ Result<std::unique_ptr<MessageBus>> open_lcm_bus(const std::string& url);
 /// @return errors as open_lcm_bus.  @thread boot
 Result<std::unique_ptr<CommandPort>> open_lcm_commands(const std::string& url);
 
-/// Odometry from the network. `at` is lock-free.
-class LcmOdometry : public OdometryPort {
- public:
-  /// Messages on the channel that are no poses of a body, or came while 256 others waited, since the start.
-  /// @thread any
-  virtual uint32_t refused() const = 0;
-};
-
-/// Listens for ODOMETRY (bot_core.pose_t) on a thread of its own, as open_lcm_commands. A step of the stamps
-/// of more than a second, either way, is a new beginning: older samples are forgotten.
+/// Listens for ODOMETRY (bot_core.pose_t) on a thread of its own, as open_lcm_commands; `at` is lock-free.
+/// `refused` counts messages that are no poses of a body, or came while 256 others waited. A step of the
+/// stamps of more than a second, either way, is a new beginning: older samples are forgotten.
 /// @param clock the stamp, on the clock that `at` is asked with, of a time in UTC; called on the listening
 ///              thread, and must not throw
 /// @thread boot
-Result<std::unique_ptr<LcmOdometry>> open_lcm_odometry(const std::string& url,
+Result<std::unique_ptr<OdometryPort>> open_lcm_odometry(const std::string& url,
                                                        std::function<Stamp(Utime)> clock);
 
 }  // namespace stillmap

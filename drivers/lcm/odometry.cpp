@@ -28,7 +28,7 @@ std::optional<Se3d> body_pose(const PoseMessage& message) {
   return Se3d{rotation_from(Quatd{q[1], q[2], q[3], q[0]}), {p[0], p[1], p[2]}};
 }
 
-class NetworkOdometry final : public LcmOdometry {
+class NetworkOdometry final : public OdometryPort {
  public:
   explicit NetworkOdometry(std::function<Stamp(Utime)> clock) : clock_(std::move(clock)) {}
 
@@ -78,11 +78,11 @@ class NetworkOdometry final : public LcmOdometry {
 
 }  // namespace
 
-Result<std::unique_ptr<LcmOdometry>> open_lcm_odometry(const std::string& url,
+Result<std::unique_ptr<OdometryPort>> open_lcm_odometry(const std::string& url,
                                                        std::function<Stamp(Utime)> clock) {
   auto odometry = std::make_unique<NetworkOdometry>(std::move(clock));
   if (const auto opened = odometry->open(url); !opened) return Error{opened.error(), opened.error_kind()};
-  return std::unique_ptr<LcmOdometry>(std::move(odometry));
+  return std::unique_ptr<OdometryPort>(std::move(odometry));
 }
 
 }  // namespace stillmap

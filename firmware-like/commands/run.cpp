@@ -46,7 +46,7 @@ struct Lcm {
   std::unique_ptr<MessageCodec> codec;
   std::unique_ptr<MessageBus> bus;
   std::unique_ptr<CommandPort> commands;
-  std::unique_ptr<LcmOdometry> odometry;
+  std::unique_ptr<OdometryPort> odometry;
 
   void say_boot(int64_t utc_us) const {
     if (!bus) return;

@@ -78,6 +78,7 @@ void RunOutputs::tell(const std::string& error) {
   if (error.empty() || !told_.insert(error).second) return;
   std::fprintf(stderr, "stillmap: %s\n", error.c_str());
   events_.fault(last_stamp_, "record_failed", error);
+  if (state_) state_->faults.raise(Fault::record_failed, monotonic_ns());
 }
 
 void RunOutputs::add(const RunItem& item, const RgbdFrame* frame, ImageView<const uint8_t> mask) {
@@ -125,13 +126,18 @@ void RunOutputs::add_to_log(const RunItem& item, const RgbdFrame* frame) {
 void RunOutputs::note_log(Status status) {
   if (!state_) return;
   const int64_t now_ns = monotonic_ns();
-  if (status == Status::ok) {
+  const bool fails = status != Status::ok;
+  if (fails == log_fails_) return;
+  log_fails_ = fails;
+  if (!fails) {
     state_->faults.clear(Fault::log_full);
     state_->faults.clear(Fault::record_failed);
-  } else {
-    state_->faults.hold(status == Status::capacity_exhausted ? Fault::log_full : Fault::record_failed,
-                        now_ns);
+    return;
   }
+  const Fault fault = status == Status::capacity_exhausted ? Fault::log_full : Fault::record_failed;
+  state_->faults.hold(fault, now_ns);
+  std::fprintf(stderr, "stillmap: %s\n", log_->error());
+  events_.fault(last_stamp_, name_of(fault), log_->error());
 }
 
 void RunOutputs::idle() {

@@ -124,6 +124,7 @@ class RunOutputs final : public RunRecorder {
   Progress* progress_ = nullptr;
   RunState* state_ = nullptr;
   std::unique_ptr<LogRecorder> log_;  ///< null: record.log is off
+  bool log_fails_ = false;
   std::optional<MessageMaker> maker_;
   const UtcClock* clock_ = nullptr;
   const BlockArchive* archive_ = nullptr;

@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
+#include <thread>
 
 #include "runtime/core/clock.hpp"
 #include "runtime/record/trajectory_writer.hpp"
@@ -23,6 +25,7 @@ void Capture::run() {
   uint32_t slot = 0;
   bool have_slot = false;
   uint32_t read = 0;
+  state_.last_frame_ns.store(monotonic_ns(), std::memory_order_relaxed);
   while (!state_.stop.load(std::memory_order_relaxed) &&
          (limits_.max_frames == 0 || read < limits_.max_frames)) {
     state_.capture.beat();
@@ -30,6 +33,10 @@ void Capture::run() {
     if (!have_slot) continue;
     slots_[slot].frame().captured = {};
     const Status status = source_.next(slots_[slot].frame(), static_cast<int32_t>(kWait.count()));
+    if (gone(status)) {
+      wait_for_camera();
+      continue;
+    }
     if (status == Status::timeout) continue;
     if (status == Status::end) break;
     if (status != Status::ok && status != Status::bad_data) {
@@ -47,6 +54,47 @@ void Capture::run() {
   }
   if (have_slot) slots_.release(slot);
   ended_.store(true, std::memory_order_release);
+}
+
+/// A camera that may come back.
+bool Capture::gone(Status status) const {
+  if (!source_.live() || (status != Status::unavailable && status != Status::timeout)) return false;
+  const int64_t silent_ns = monotonic_ns() - state_.last_frame_ns.load(std::memory_order_relaxed);
+  return status == Status::unavailable || static_cast<double>(silent_ns) * 1e-9 >= limits_.gone_s;
+}
+
+/// Opens it again until it is there, or a stop is asked for. The map stays; the pose is lost until it is
+/// found in it.
+void Capture::wait_for_camera() {
+  const int64_t since_ns = monotonic_ns();
+  state_.faults.hold(Fault::camera_gone, since_ns);
+  say(Notice::Kind::fault,
+      source_.error().empty() ? fmt::format("no frame for {} s", limits_.gone_s) : source_.error());
+  double wait_s = limits_.reopen_s;
+  while (source_.reopen() != Status::ok) {
+    if (!pause(wait_s)) return;
+    wait_s = std::min(2 * wait_s, limits_.reopen_max_s);
+  }
+  const int64_t now_ns = monotonic_ns();
+  state_.faults.clear(Fault::camera_gone);
+  state_.last_frame_ns.store(now_ns, std::memory_order_relaxed);
+  say(Notice::Kind::info, fmt::format("back after {:.1f} s", static_cast<double>(now_ns - since_ns) * 1e-9));
+}
+
+/// @return false: a stop was asked for
+bool Capture::pause(double seconds) {
+  const int64_t until_ns = monotonic_ns() + static_cast<int64_t>(seconds * 1e9);
+  while (!state_.stop.load(std::memory_order_relaxed)) {
+    state_.capture.beat();
+    const int64_t left_ns = until_ns - monotonic_ns();
+    if (left_ns <= 0) return true;
+    std::this_thread::sleep_for(std::min<std::chrono::nanoseconds>(kWait, std::chrono::nanoseconds(left_ns)));
+  }
+  return false;
+}
+
+void Capture::say(Notice::Kind kind, const std::string& text) {
+  notices_.push(Notice::make(kind, last_, name_of(Fault::camera_gone), text));
 }
 
 /// @return whether the slot went on

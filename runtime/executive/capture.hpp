@@ -13,10 +13,15 @@ namespace stillmap {
 
 struct CaptureLimits {
   uint32_t max_frames = 0;  ///< to be read; 0: no limit
+  // Of cameras, SourceConfig.
+  double gone_s = 5;
+  double reopen_s = 0.5;
+  double reopen_max_s = 10;
 };
 
 /// Reads a source until it ends and hands over each frame; where nobody takes them, the newest stays. Waits
 /// for a free slot before it reads: with one slot, reading and working alternate and no frame is lost.
+/// A camera that is gone is opened again, and again, until it is back or a stop is asked for.
 /// @thread run: capture; the others: any
 class Capture {
  public:
@@ -37,6 +42,10 @@ class Capture {
   bool deliver(uint32_t slot);
   void count_dropped(uint32_t frames);
   void pass_over(const std::string& why);
+  bool gone(Status status) const;
+  void wait_for_camera();
+  bool pause(double seconds);
+  void say(Notice::Kind kind, const std::string& text);
   bool jumps_back(const RgbdFrame& frame) const { return delivered_ > 0 && frame.depth_stamp <= last_; }
 
   FrameSource& source_;

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <utility>
 
+#include "runtime/core/heap_guard.hpp"
 #include "runtime/executive/mode.hpp"
 #include "runtime/executive/real_time.hpp"
 
@@ -18,11 +19,11 @@ constexpr int64_t kSecond_ns = 1'000'000'000;
 constexpr int64_t kStalled_ns = 10 * kSecond_ns;  ///< a thread that gives no sign of life for so long
 constexpr uint32_t kPublishItems = 64, kRecordItems = 256, kNotices = 64;
 /// Faults that are lines of their own where they come up; the others are told by the supervisor.
-constexpr Fault kToldElsewhere[] = {Fault::bad_frame,      Fault::tracking_lost,   Fault::new_map,
-                                    Fault::map_full,       Fault::archive_full,    Fault::archive_failed,
-                                    Fault::record_failed,  Fault::frame_dropped,   Fault::deadline_missed,
-                                    Fault::result_dropped, Fault::work_shed,       Fault::clock_jump,
-                                    Fault::thread_stalled, Fault::realtime_refused};
+constexpr Fault kToldElsewhere[] = {
+    Fault::bad_frame, Fault::camera_gone,   Fault::tracking_lost,   Fault::new_map,
+    Fault::map_full,  Fault::archive_full,  Fault::archive_failed,  Fault::record_failed,
+    Fault::log_full,  Fault::frame_dropped, Fault::deadline_missed, Fault::result_dropped,
+    Fault::work_shed, Fault::clock_jump,    Fault::thread_stalled,  Fault::realtime_refused};
 
 /// Names stay inside the folder of the run.
 bool good_name(std::string_view name) {
@@ -57,7 +58,10 @@ Executive::Executive(ExecutiveParts parts, const Config& config, const Executive
       to_publish_(kPublishItems),
       to_record_(kRecordItems),
       notices_(kNotices),
-      capture_(p_.source, slots_, mailbox_, p_.state, {options.max_frames}),
+      capture_(
+          p_.source, slots_, mailbox_, p_.state,
+          {options.max_frames, static_cast<double>(config.source.gone_s),
+           static_cast<double>(config.source.reopen_s), static_cast<double>(config.source.reopen_max_s)}),
       loop_({p_.engine, p_.pipeline, capture_, slots_, mailbox_, p_.state, to_publish_, to_record_,
              p_.archive, p_.map_keeper, p_.odometry, p_.observers},
             {static_cast<double>(config.lost.new_map_after_s), static_cast<double>(config.runtime.period_ms),
@@ -100,6 +104,7 @@ RunEnd Executive::run() {
       tell(Notice::Kind::warning, name_of(Fault::realtime_refused), refused);
     }
   if (p_.service) p_.service->ready();
+  heap_ = heap_guard::allocations();
   const RuntimeConfig& r = config_.runtime;
   std::vector<std::jthread> recording, publishing, working, capturing;
   start_thread(recording, plan("record", 0, r.other_cpus), [this] { record_.run(); });
@@ -132,6 +137,7 @@ void Executive::supervise() {
   if (p_.stop_requested && p_.stop_requested()) p_.state.stop.store(true, std::memory_order_relaxed);
   watch_camera(now_ns);
   watch_threads(now_ns);
+  watch_counters(now_ns);
   watch_faults();
   watch_mode();
   follow_clock(now_ns);
@@ -172,6 +178,17 @@ void Executive::watch_threads(int64_t now_ns) {
   }
   // Who watches over the program restarts it when a thread hangs.
   if (all_well && p_.service) p_.service->alive();
+}
+
+/// What others only count becomes a fault here.
+void Executive::watch_counters(int64_t now_ns) {
+  const uint32_t foreign =
+      (p_.commands ? p_.commands->refused() : 0) + (p_.odometry ? p_.odometry->refused() : 0);
+  if (foreign != foreign_) p_.state.faults.raise(Fault::foreign_message, now_ns, foreign - foreign_);
+  foreign_ = foreign;
+  const uint64_t heap = heap_guard::allocations();
+  if (heap != heap_) p_.state.faults.raise(Fault::heap_used, now_ns, static_cast<uint32_t>(heap - heap_));
+  heap_ = heap;
 }
 
 void Executive::watch_mode() {

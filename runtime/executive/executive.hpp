@@ -80,6 +80,7 @@ class Executive {
   void supervise();
   void watch_camera(int64_t now_ns);
   void watch_threads(int64_t now_ns);
+  void watch_counters(int64_t now_ns);
   void watch_mode();
   void watch_faults();
   void follow_clock(int64_t now_ns);
@@ -113,6 +114,8 @@ class Executive {
   Mode mode_ = Mode::boot;
   Shed shed_ = Shed::nothing;
   uint64_t faults_told_ = 0;
+  uint32_t foreign_ = 0;  ///< messages, as counted
+  uint64_t heap_ = 0;     ///< calls of armed threads, as counted
   int64_t clock_followed_ns_ = 0;
   std::optional<CommandMessage> command_;  ///< save_*: on its way
   std::thread mesh_thread_;

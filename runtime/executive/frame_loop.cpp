@@ -44,7 +44,7 @@ void FrameLoop::work_on(uint32_t slot) {
     result = p_.pipeline.process(frame, work, this);
     if (p_.odometry) p_.odometry->log(decision_);
     if (p_.archive) decision_.archive_answers = p_.archive->step(p_.engine, p_.pipeline.centre_map());
-    if (limits_.live) count_lateness(result);
+    if (limits_.live) count_lateness(result, work);
     note_faults(result);
     note_discontinuity();
     publish(result, true, p_.state.pose_epoch.load(std::memory_order_relaxed));
@@ -77,14 +77,14 @@ double FrameLoop::period_ms(Stamp stamp) {
   return shortest_ms_;
 }
 
-void FrameLoop::count_lateness(const FrameResult& result) {
+void FrameLoop::count_lateness(const FrameResult& result, const FrameWork& work) {
   const double period = period_ms(result.stamp);
   const auto total_ms = static_cast<double>(result.ms.total_ms);
   if (period > 0 && total_ms > period) {
     p_.state.deadline_misses.fetch_add(1, std::memory_order_relaxed);
     p_.state.faults.raise(Fault::deadline_missed, monotonic_ns());
   }
-  load_.add(total_ms, result.integrated, period);
+  load_.add(total_ms, work.integrate, period);
   p_.state.shed.store(static_cast<uint8_t>(load_.shed()), std::memory_order_relaxed);
   if (load_.shed() == Shed::nothing)
     p_.state.faults.clear(Fault::work_shed);
@@ -100,6 +100,10 @@ void FrameLoop::note_faults(const FrameResult& result) {
     faults.hold(Fault::tracking_lost, now_ns);
   else
     faults.clear(Fault::tracking_lost);
+  if (result.odometry_stale)
+    faults.hold(Fault::odometry_stale, now_ns);
+  else
+    faults.clear(Fault::odometry_stale);
   if (given_up(result.map) > given_up(last_.map)) faults.raise(Fault::map_full, now_ns);
 }
 
@@ -112,7 +116,7 @@ void FrameLoop::note_discontinuity() {
 
 void FrameLoop::pose_known(const FrameResult& result) {
   // The pose of a frame that ends the search for the camera is the first of the next epoch.
-  const bool found_again = last_.state == TrackingState::lost && frames_ > 0;
+  const bool found_again = p_.pipeline.was_lost();
   publish(result, false, p_.state.pose_epoch.load(std::memory_order_relaxed) + (found_again ? 1 : 0));
 }
 

@@ -57,7 +57,7 @@ class FrameLoop final : public PoseListener {
  private:
   void work_on(uint32_t slot);
   void decide(const RgbdFrame& frame, const FrameWork& work);
-  void count_lateness(const FrameResult& result);
+  void count_lateness(const FrameResult& result, const FrameWork& work);
   void note_faults(const FrameResult& result);
   void note_discontinuity();
   void keep_map(const FrameResult& result);

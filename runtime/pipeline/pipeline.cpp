@@ -88,7 +88,8 @@ FrameResult Pipeline::process(const RgbdFrame& frame, const FrameWork& work, Pos
       result = start_map(result);
     else
       result = lost_ && relocaliser_.enabled() ? find_again(result) : track_and_map(result);
-    if (result.state == TrackingState::good) relocaliser_.remember(result.T_map_cam);
+    if (result.state == TrackingState::good && (config_.pipeline.mapping || result.integrated))
+      relocaliser_.remember(result.T_map_cam);
   } else if (!lost_) {
     result = go_on_blind(result);
     announce(result);
@@ -139,6 +140,8 @@ TrackResult Pipeline::first_registration(const PosePrior& prior) {
 FrameResult Pipeline::track_and_map(FrameResult result) {
   StopWatch watch;
   const PredictedPose expected = predictor_.predict(result.stamp);
+  result.odometry_stale =
+      config_.track.prior == MotionPrior::odometry && expected.from != MotionPrior::odometry;
   const PosePrior prior = prior_from(expected, config_.track);
   const TrackResult initial = first_registration(prior);
   result.ms.track_ms = watch.lap_ms();
@@ -161,7 +164,8 @@ FrameResult Pipeline::track_and_map(FrameResult result) {
   }
   announce(result);
   // A poor pose freezes the map.
-  if (result.state == TrackingState::good && work_.integrate) integrate(refined.T_world_cam, result);
+  if (result.state == TrackingState::good && work_.integrate && config_.pipeline.mapping)
+    integrate(refined.T_world_cam, result);
   result.ms.integrate_ms = watch.lap_ms();
   return result;
 }

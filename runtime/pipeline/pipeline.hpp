@@ -36,10 +36,11 @@ struct FrameResult {
   TrackingState state = TrackingState::good;
   float p_good = 0;  ///< probability that the pose is good, 0..1
   float inlier_ratio = 0;
-  float masked_fraction = 0;  ///< masked pixels over all pixels
-  bool integrated = false;    ///< the map was worked on
-  Se3d T_map_cam;             ///< predicted pose while lost
-  float covariance[21] = {};  ///< upper triangle, x y z rx ry rz, left perturbation
+  float masked_fraction = 0;    ///< masked pixels over all pixels
+  bool integrated = false;      ///< the map was worked on
+  bool odometry_stale = false;  ///< track.prior = "odometry", but there was none for this frame
+  Se3d T_map_cam;               ///< predicted pose while lost
+  float covariance[21] = {};    ///< upper triangle, x y z rx ry rz, left perturbation
   StageTimes ms;
   MapHealth map;
 };
@@ -83,6 +84,8 @@ class Pipeline {
   double lost_s() const {
     return lost_since_ ? static_cast<double>(stamp_.ns - lost_since_->ns) * 1e-9 : 0.0;
   }
+  /// Before the frame that is worked on: a pose that is found in it is the first of a new epoch.
+  bool was_lost() const { return lost_; }
   /// Forgets the map; the next usable frame begins another one, where the camera was seen last: the poses go
   /// on, but what was known of before is elsewhere.                                         test:
   /// pipeline_test

@@ -29,6 +29,8 @@ class FrameOdometry final : public OdometryPort {
     return give(ask, sample);
   }
 
+  uint32_t refused() const override { return odometry_ ? odometry_->refused() : 0; }
+
   /// What was answered in this frame.
   void log(DecisionMessage& decision) const {
     decision.odometry_answers = 0;

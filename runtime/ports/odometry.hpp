@@ -22,6 +22,8 @@ class OdometryPort {
   /// newest sample with its own, earlier stamp: how old is too old is for the caller to say.
   /// @return ok; timeout: no sample reaches back to `stamp`, or there is none
   virtual Status at(Stamp stamp, OdometrySample& sample) = 0;
+  /// What came in its place and is none, since the start.  @thread any
+  virtual uint32_t refused() const { return 0; }
 };
 
 }  // namespace stillmap

@@ -231,7 +231,7 @@ TEST_F(LcmNetwork, CommandsAreHeardOnceThereIsARoute) {
 }
 
 /// Waits until `odometry` answers with a sample of that stamp.
-bool heard(LcmOdometry& odometry, int64_t stamp_ns) {
+bool heard(OdometryPort& odometry, int64_t stamp_ns) {
   OdometrySample sample;
   return eventually(
       [&] { return odometry.at({stamp_ns}, sample) == Status::ok && sample.stamp.ns == stamp_ns; });

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <thread>
 #include <vector>
 
@@ -37,6 +38,45 @@ class SlowCamera final : public FrameSource {
   FrameSource& source_;
 };
 constexpr double kSlowPeriod_ms = kPeriod_ms * SlowCamera::kTimes;
+
+/// A camera that stops at one of its frames, by going away or by saying nothing, until it is opened again.
+class FlakyCamera final : public FrameSource {
+ public:
+  enum class Trouble { gone, silent };
+  FlakyCamera(FrameSource& source, Trouble trouble, uint32_t at_frame, uint32_t failures)
+      : source_(source), trouble_(trouble), left_(at_frame), failures_(failures) {}
+
+  const SourceInfo& info() const override { return source_.info(); }
+  bool live() const override { return true; }
+  Status next(RgbdFrame& frame, int32_t timeout_ms) override {
+    if (!well_ && trouble_ == Trouble::gone) return Status::unavailable;
+    if (!well_) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(timeout_ms));
+      return Status::timeout;
+    }
+    const Status status = source_.next(frame, timeout_ms);
+    if (status == Status::ok && --left_ == 0) well_ = false;
+    return status;
+  }
+  Status reopen() override {
+    reopened_ns.push_back(monotonic_ns());
+    if (reopened_ns.size() <= failures_) return Status::unavailable;
+    well_ = true;
+    return Status::ok;
+  }
+  void skip(uint32_t count) override { source_.skip(count); }
+  const std::string& error() const override { return error_; }
+
+  std::vector<int64_t> reopened_ns;
+
+ private:
+  FrameSource& source_;
+  const Trouble trouble_;
+  uint32_t left_;
+  const uint32_t failures_;
+  bool well_ = true;
+  std::string error_ = "the cable was pulled";
+};
 
 /// Keeps what it is told.
 class Notebook final : public RunRecorder {
@@ -118,8 +158,9 @@ class Orders final : public CommandPort {
     waiting.pop_back();
     return Status::ok;
   }
-  uint32_t refused() const override { return 0; }
+  uint32_t refused() const override { return foreign; }
   std::vector<CommandMessage> waiting;
+  uint32_t foreign = 0;
 };
 
 class Executives : public testing::Test {
@@ -140,16 +181,21 @@ class Executives : public testing::Test {
     Pipeline pipeline(engine, config);
     SlowCamera slow(*source);
     PacedSource paced(slow_camera ? static_cast<FrameSource&>(slow) : *source);
-    ExecutiveParts parts{
-        live ? static_cast<FrameSource&>(paced) : *source, engine, pipeline, notebook, state, clock};
+    std::optional<FlakyCamera> flaky;
+    if (trouble) flaky.emplace(paced, *trouble, 15, reopen_failures);
+    FrameSource& frames = flaky ? static_cast<FrameSource&>(*flaky) : live ? paced : *source;
+    ExecutiveParts parts{frames, engine, pipeline, notebook, state, clock};
     parts.codec = &ear;
     parts.bus = &ear;
     parts.commands = &orders;
     parts.stop_requested = [this] { return stop.load(); };
     parts.on_status = [this](const StatusMessage& status) { modes.push_back(status.mode); };
     Executive executive(parts, config, {{}, max_frames, live, keep_images});
-    return executive.run();
+    const RunEnd end = executive.run();
+    if (flaky) reopened_ns = flaky->reopened_ns;
+    return end;
   }
+  bool was_in(Mode mode) const { return std::find(modes.begin(), modes.end(), mode) != modes.end(); }
 
   Config config;
   std::unique_ptr<FrameSource> source;
@@ -162,6 +208,9 @@ class Executives : public testing::Test {
   std::atomic<bool> stop{false};
   bool keep_images = false, slow_camera = false;
   test::EngineDelays delays;
+  std::optional<FlakyCamera::Trouble> trouble;
+  uint32_t reopen_failures = 0;
+  std::vector<int64_t> reopened_ns;
 };
 
 TEST_F(Executives, ARecordingIsWorkedThroughWithoutLosingAFrame) {
@@ -191,6 +240,68 @@ TEST_F(Executives, AStopEndsIt) {
   signal.join();
   EXPECT_LT(static_cast<double>(monotonic_ns() - start_ns) * 1e-9, 10.0);
   EXPECT_TRUE(notebook.heard("mode: safe_stop"));
+}
+
+TEST_F(Executives, ACameraThatIsGoneIsOpenedAgainAndTheMapStays) {
+  config.source.reopen_s = 0.1f;
+  config.source.reopen_max_s = 0.2f;
+  trouble = FlakyCamera::Trouble::gone;
+  reopen_failures = 3;
+  const RunEnd end = run("crowd-static,size=80x60,seconds=3", true);
+  EXPECT_EQ(end.error, "");
+  EXPECT_EQ(end.state, TrackingState::good);
+  ASSERT_EQ(reopened_ns.size(), 4u);
+  // Twice the wait after each failure, up to the longest.
+  EXPECT_GE(reopened_ns[1] - reopened_ns[0], 100'000'000);
+  EXPECT_GE(reopened_ns[2] - reopened_ns[1], 200'000'000);
+  EXPECT_GE(reopened_ns[3] - reopened_ns[2], 200'000'000);
+  EXPECT_EQ(state.faults.entry(Fault::camera_gone).count, 1u);
+  EXPECT_EQ(state.faults.active() >> static_cast<uint32_t>(Fault::camera_gone) & 1, 0u);
+  EXPECT_TRUE(notebook.heard("camera_gone: the cable was pulled"));
+  EXPECT_TRUE(notebook.heard("camera_gone: back after"));
+  EXPECT_TRUE(was_in(Mode::lost));
+  EXPECT_EQ(state.map_id, 0u);  // the map it had
+  EXPECT_GT(notebook.items.size(), 30u);
+}
+
+TEST_F(Executives, ACameraThatSaysNothingIsStalledThenOpenedAgain) {
+  config.source.stall_s = 0.2f;
+  config.source.gone_s = 0.5f;
+  trouble = FlakyCamera::Trouble::silent;
+  const RunEnd end = run("crowd-static,size=80x60,seconds=2", true);
+  EXPECT_EQ(end.error, "");
+  EXPECT_EQ(reopened_ns.size(), 1u);
+  EXPECT_GE(state.faults.entry(Fault::camera_stalled).count, 1u);
+  EXPECT_EQ(state.faults.entry(Fault::camera_gone).count, 1u);
+  EXPECT_GT(notebook.items.size(), 15u);
+}
+
+TEST_F(Executives, AStopEndsTheWaitForACamera) {
+  config.source.reopen_s = 1000;
+  config.source.reopen_max_s = 1000;
+  trouble = FlakyCamera::Trouble::gone;
+  reopen_failures = 1000;
+  std::thread signal([this] {
+    while ((state.faults.active() >> static_cast<uint32_t>(Fault::camera_gone) & 1) == 0)
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    stop = true;
+  });
+  const RunEnd end = run("crowd-static,size=80x60,seconds=60", true);
+  signal.join();
+  EXPECT_EQ(end.error, "");
+  EXPECT_EQ(reopened_ns.size(), 1u);
+}
+
+TEST_F(Executives, ForeignMessagesAreAFault) {
+  orders.foreign = 3;
+  run("crowd,size=80x60,seconds=1", false);
+  EXPECT_EQ(state.faults.entry(Fault::foreign_message).count, 3u);
+}
+
+TEST_F(Executives, OdometryThatIsNotThereIsAFault) {
+  config.track.prior = MotionPrior::odometry;
+  run("crowd,size=80x60,seconds=1", false);
+  EXPECT_EQ(state.faults.entry(Fault::odometry_stale).count, 1u);
 }
 
 TEST_F(Executives, WithoutANetworkItGoesOnAndSaysSo) {

@@ -298,6 +298,20 @@ TEST_F(PipelineTest, APoorPoseFreezesTheMap) {
   EXPECT_EQ(pipeline.counters().lost_frames, 0u);
 }
 
+TEST_F(PipelineTest, WithoutMappingTheFirstFrameStaysTheMap) {
+  config_.pipeline.mapping = false;
+  Pipeline pipeline(engine_, config_);
+  answer(at(0.01f));
+  EXPECT_TRUE(process(pipeline, 33).integrated);
+  const auto keyframes = engine_.keyframes;
+  EXPECT_GT(keyframes, 0);
+  const FrameResult result = process(pipeline, 66);
+  EXPECT_EQ(result.state, TrackingState::good);
+  EXPECT_FALSE(result.integrated);
+  EXPECT_EQ(engine_.calls, "ptm");
+  EXPECT_EQ(engine_.keyframes, keyframes);
+}
+
 TEST_F(PipelineTest, LostIsSaidCountedAndComesBack) {
   Pipeline pipeline(engine_, config_);
   process(pipeline, 0);
