@@ -4,6 +4,7 @@
 #include <string>
 
 #include "firmware-like/commands/command.hpp"
+#include "firmware-like/journal.hpp"
 #include "runtime/core/version.hpp"
 
 namespace stillmap {
@@ -43,7 +44,7 @@ int main(int argc, char** argv) {
   try {
     return stillmap::run_program(argc, argv);
   } catch (const std::exception& error) {  // what no border caught: memory, or a defect
-    std::fprintf(stderr, "stillmap: %s\n", error.what());
+    stillmap::say(stillmap::Priority::error, error.what());
     return stillmap::kExitFailed;
   }
 }

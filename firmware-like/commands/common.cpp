@@ -7,6 +7,7 @@
 #include "firmware-like/commands/command.hpp"
 #include "firmware-like/commands/engines.hpp"
 #include "firmware-like/commands/stop_signal.hpp"
+#include "firmware-like/journal.hpp"
 #include "runtime/archive/map_saver.hpp"
 #include "runtime/record/log_recorder.hpp"
 
@@ -14,7 +15,7 @@ namespace stillmap {
 
 int fail(const std::string& message, ErrorKind kind) {
   std::fflush(stdout);
-  std::fprintf(stderr, "stillmap: %s\n", message.c_str());
+  say(Priority::error, message);
   switch (kind) {
     case ErrorKind::failed:
       return kExitFailed;

@@ -1,4 +1,5 @@
 #include "firmware-like/commands/engines.hpp"
+#include "firmware-like/journal.hpp"
 
 #include <cstdio>
 
@@ -9,11 +10,10 @@ std::string pick_device(const std::string& wanted, bool quiet) {
   const char* missing = cuda_missing();
   if (!cuda_is_built() || quiet) return "cpu";
   if (missing)
-    std::fprintf(stderr, "stillmap: no CUDA device (%s); the CPU engine runs\n", missing);
+    say(Priority::info, std::string("no CUDA device (") + missing + "); the CPU engine runs");
   else  // until toolchain/gpu_check.sh has passed on a device
-    std::fprintf(
-        stderr,
-        "stillmap: the CPU engine runs; the CUDA engine has not been proven yet, --device cuda takes it\n");
+    say(Priority::info,
+        "the CPU engine runs; the CUDA engine has not been proven yet, --device cuda takes it");
   return "cpu";
 }
 

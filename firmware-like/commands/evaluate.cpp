@@ -16,6 +16,7 @@
 #include <CLI/CLI.hpp>
 
 #include "firmware-like/commands/command.hpp"
+#include "firmware-like/journal.hpp"
 #include "runtime/evaluate/report.hpp"
 #include "runtime/evaluate/suite.hpp"
 #include "runtime/record/output_file.hpp"
@@ -130,14 +131,13 @@ Result<std::string> run_sequence(const std::string& sequence, const std::string&
   const int exit_code = WEXITSTATUS(status);
   if (exit_code != kExitDone && exit_code != kExitLost)
     return Error{fmt::format("{}: the run ended with exit code {}", sequence, exit_code)};
-  if (exit_code == kExitLost) std::fprintf(stderr, "stillmap: %s: tracking was lost\n", sequence.c_str());
+  if (exit_code == kExitLost) say(Priority::warning, sequence + ": tracking was lost");
   return (dir / "trajectory.txt").string();
 }
 
 int evaluate_suite_dir(const SuiteOptions& options) {
   const SuiteRun run = [&](const std::string& sequence, const std::string& config) {
-    std::fprintf(stderr, "stillmap: %s with %s\n", sequence.c_str(),
-                 config.empty() ? "default" : config.c_str());
+    say(Priority::info, sequence + " with " + (config.empty() ? "default" : config));
     return run_sequence(sequence, config, options.out);
   };
   const Result<SuiteResult> suite = evaluate_suite(options.dir, options.configs, run);

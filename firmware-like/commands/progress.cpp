@@ -1,4 +1,5 @@
 #include "firmware-like/commands/progress.hpp"
+#include "firmware-like/journal.hpp"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -16,7 +17,7 @@ double seconds_between(std::chrono::steady_clock::time_point a, std::chrono::ste
 }  // namespace
 
 Progress::Progress(int64_t frames, bool quiet)
-    : frames_(frames), quiet_(quiet), terminal_(isatty(STDOUT_FILENO) == 1) {}
+    : frames_(frames), quiet_(quiet || journal_reads()), terminal_(isatty(STDOUT_FILENO) == 1) {}
 
 void Progress::show(const FrameResult& r, uint32_t frames_done) {
   if (quiet_) return;

@@ -11,6 +11,8 @@ namespace stillmap {
 class Progress {
  public:
   /// @param frames expected, -1: unknown
+  /// Nothing is shown where systemd's journal reads: a line a second for weeks is none that anybody looks
+  /// for.
   Progress(int64_t frames, bool quiet);
 
   void show(const FrameResult& result, uint32_t frames_done);

@@ -17,6 +17,7 @@
 #include "firmware-like/commands/progress.hpp"
 #include "firmware-like/commands/run_outputs.hpp"
 #include "firmware-like/commands/stop_signal.hpp"
+#include "firmware-like/journal.hpp"
 #include "runtime/archive/block_archive.hpp"
 #include "runtime/archive/map_file.hpp"
 #include "runtime/core/version.hpp"
@@ -184,7 +185,7 @@ int replay(const std::string& log, const std::string& out, bool quiet) {
   const std::string why = difference(source, loop);
   if (!why.empty()) {
     outputs.event(Stamp{}, "replay", why);
-    std::fprintf(stderr, "stillmap: the poses may differ from those of the live run: %s\n", why.c_str());
+    say(Priority::warning, "the poses may differ from those of the live run: " + why);
   }
   outputs.finish(*engine, source, pipeline.counters(), nullptr, archive.get(), -1);
   if (!quiet) fmt::print("{} frames in {:.1f} s\n", pipeline.counters().frames, progress.seconds());

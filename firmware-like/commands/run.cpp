@@ -25,6 +25,7 @@
 #include "firmware-like/commands/run_outputs.hpp"
 #include "firmware-like/commands/snapshots.hpp"
 #include "firmware-like/commands/stop_signal.hpp"
+#include "firmware-like/journal.hpp"
 #include "firmware-like/metrics_server.hpp"
 #include "firmware-like/systemd.hpp"
 #include "runtime/archive/block_archive.hpp"
@@ -155,7 +156,7 @@ int exit_code_of(const RunEnd& end, const RunOutputs& outputs, const PipelineCou
   if (counters.frames == 0 && !stop_requested())
     return fail("no frame of the source could be used", ErrorKind::failed);
   if (end.state == TrackingState::lost) {
-    std::fprintf(stderr, "stillmap: tracking was lost and not found again before the end\n");
+    say(Priority::error, "tracking was lost and not found again before the end");
     return kExitLost;
   }
   return kExitDone;

@@ -14,6 +14,7 @@
 #include "config/describe.hpp"
 #include "config/engine_params.hpp"
 #include "firmware-like/commands/stop_signal.hpp"
+#include "firmware-like/journal.hpp"
 #include "runtime/archive/whole_mesh.hpp"
 #include "runtime/core/clock.hpp"
 #include "runtime/core/heap_guard.hpp"
@@ -69,6 +70,8 @@ std::string RunOutputs::open(const std::string& dir) {
   states->rotate_at(most_bytes, record_.streams_kept);
   timing->rotate_at(most_bytes, record_.streams_kept);
   events_ = std::move(*events);
+  events_.set_listener(
+      [this](bool fault, std::string_view name, std::string_view text) { pass_on_event(fault, name, text); });
   files_.emplace(
       Files{std::move(*folder), std::move(*trajectory), std::move(*states), std::move(*timing), {}});
   return {};
@@ -76,7 +79,7 @@ std::string RunOutputs::open(const std::string& dir) {
 
 void RunOutputs::tell(const std::string& error) {
   if (error.empty() || !told_.insert(error).second) return;
-  std::fprintf(stderr, "stillmap: %s\n", error.c_str());
+  if (!journal_reads()) say(Priority::error, error);
   events_.fault(last_stamp_, "record_failed", error);
   if (state_) state_->faults.raise(Fault::record_failed, monotonic_ns());
 }
@@ -103,14 +106,18 @@ void RunOutputs::log_to(std::unique_ptr<LogRecorder> log, MessageMaker maker, co
   log_ = std::move(log);
   maker_.emplace(std::move(maker));
   clock_ = &clock;
-  events_.set_listener([this](bool fault, std::string_view name, std::string_view text) {
-    EventMessage message;
-    message.utime.us = clock_->to_utc_us(monotonic_ns());
-    message.fault = fault;
-    message.name = name.substr(0, kEventNameBytes);
-    message.text = text.substr(0, kEventTextBytes);
-    note_log(log_->write(message));
-  });
+}
+
+/// What events.log has goes to the journal and into the event log as well.
+void RunOutputs::pass_on_event(bool fault, std::string_view name, std::string_view text) {
+  if (journal_reads()) say(fault ? Priority::warning : Priority::info, fmt::format("{}: {}", name, text));
+  if (!log_) return;
+  EventMessage message;
+  message.utime.us = clock_->to_utc_us(monotonic_ns());
+  message.fault = fault;
+  message.name = name.substr(0, kEventNameBytes);
+  message.text = text.substr(0, kEventTextBytes);
+  note_log(log_->write(message));
 }
 
 void RunOutputs::add_to_log(const RunItem& item, const RgbdFrame* frame) {
@@ -136,7 +143,7 @@ void RunOutputs::note_log(Status status) {
   }
   const Fault fault = status == Status::capacity_exhausted ? Fault::log_full : Fault::record_failed;
   state_->faults.hold(fault, now_ns);
-  std::fprintf(stderr, "stillmap: %s\n", log_->error());
+  if (!journal_reads()) say(Priority::error, log_->error());
   events_.fault(last_stamp_, name_of(fault), log_->error());
 }
 
@@ -243,9 +250,10 @@ void RunOutputs::bad_frame(Stamp stamp, const std::string& why) {
   events_.fault(stamp, "bad_frame", why);
   constexpr uint64_t kPrinted = 10;
   const uint64_t count = fault_count("bad_frame");
-  if (count <= kPrinted) std::fprintf(stderr, "stillmap: frame skipped: %s\n", why.c_str());
+  if (journal_reads()) return;
+  if (count <= kPrinted) say(Priority::warning, "frame skipped: " + why);
   if (count == kPrinted)
-    std::fprintf(stderr, "stillmap: further skipped frames go to events.log and report.json only\n");
+    say(Priority::warning, "further skipped frames go to events.log and report.json only");
 }
 
 void RunOutputs::rewrite_report() {

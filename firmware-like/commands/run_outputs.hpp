@@ -93,6 +93,7 @@ class RunOutputs final : public RunRecorder {
   void bad_frame(Stamp stamp, const std::string& why);
   void add_to_log(const RunItem& item, const RgbdFrame* frame);
   void note_log(Status status);
+  void pass_on_event(bool fault, std::string_view name, std::string_view text);
   void note_changes(const FrameResult& result);
   void add_truth(const RunItem& item);
   void add_masks(const RgbdFrame& frame, const FrameResult& result, ImageView<const uint8_t> mask);

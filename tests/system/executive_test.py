@@ -128,6 +128,20 @@ class Service(Case):
         process.communicate(timeout=PATIENCE_S)
         self.assertEqual(process.returncode, 0)
 
+    def test_the_journal_gets_events_with_their_priority_and_no_progress(self):
+        journal = self.folder / "journal"
+        with journal.open("w") as stream:
+            file = os.fstat(stream.fileno())
+            run = subprocess.run(
+                [STILLMAP, "run", "--lcm", "off", "--source", SCENE, "--max-frames", "40", "--out", str(self.out), *QUICK],
+                stdout=subprocess.PIPE, stderr=stream, text=True, timeout=PATIENCE_S,
+                env={**os.environ, "JOURNAL_STREAM": f"{file.st_dev}:{file.st_ino}"})
+        lines = journal.read_text().splitlines()
+        self.assertEqual(run.returncode, 0, lines)
+        self.assertNotIn("frames/s", run.stdout)
+        self.assertTrue(any(line.startswith("<6>mode: running") for line in lines), lines)
+        self.assertTrue(all(line[:3] in ("<3>", "<4>", "<6>") for line in lines), lines)
+
     def test_without_a_camera_it_is_ready_and_waits_in_mode_boot(self):
         process = self.start("--source", f"tum:{self.folder}/later", "--set", "source.wait_s=-1", *QUICK,
                              environment=self.environment)
