@@ -2,6 +2,7 @@
 
 #include "drivers/dataset/sevenscenes_source.hpp"
 #include "drivers/dataset/tum_source.hpp"
+#include "drivers/openni2/openni2_source.hpp"
 #include "drivers/recording/log_source.hpp"
 #include "drivers/synthetic/synthetic_source.hpp"
 
@@ -15,6 +16,7 @@ struct Scheme {
   const char* name;
   const char* usage;
   Opened (*open)(const std::string& rest, const SourceOptions& options);
+  bool rest_needed = true;
 };
 
 Opened tum(const std::string& dir, const SourceOptions& options) {
@@ -37,13 +39,25 @@ Opened log(const std::string& path, const SourceOptions& options) {
   return std::unique_ptr<FrameSource>(std::move(*source));
 }
 
+#ifdef STILLMAP_OPENNI2
+Opened xtion(const std::string& serial, const SourceOptions& options) {
+  return open_xtion(serial, options.camera);
+}
+
+Opened oni(const std::string& path, const SourceOptions& options) {
+  return open_oni(path, options.camera);
+}
+#else
+constexpr auto xtion = nullptr, oni = nullptr;
+#endif
+
 constexpr Scheme kSchemes[] = {
     {"tum", "tum:DIR", tum},
     {"sevenscenes", "sevenscenes:DIR", sevenscenes},
     {"synthetic", "synthetic:SCENE[,seed=N][,size=WxH][,seconds=S]", synthetic},
     {"log", "log:FILE", log},
-    {"xtion", "xtion[:SERIAL]", nullptr},
-    {"oni", "oni:FILE", nullptr},
+    {"xtion", "xtion[:SERIAL]", xtion, false},
+    {"oni", "oni:FILE", oni},
     {"v4l2", "v4l2:DEPTH_DEV[,COLOUR_DEV]", nullptr},
 };
 
@@ -72,7 +86,7 @@ Result<std::unique_ptr<FrameSource>> open_source(const std::string& source, cons
   for (const Scheme& scheme : kSchemes) {
     if (name != scheme.name) continue;
     if (!scheme.open) return refused(std::string(scheme.usage) + " is not part of this build");
-    if (rest.empty()) return refused(std::string("expected ") + scheme.usage);
+    if (rest.empty() && scheme.rest_needed) return refused(std::string("expected ") + scheme.usage);
     return scheme.open(rest, options);
   }
   return refused("there is no such kind of source");

@@ -124,7 +124,7 @@ class Usage(Case):
         self.refused(2, "run", "--source", "synthetic:no_such_scene", says=["no_such_scene"])
 
     def test_parts_that_are_not_built_say_so(self):
-        self.refused(2, "run", "--source", "xtion", says=["build"])
+        self.refused(2, "run", "--source", "v4l2:/dev/video0", says=["build"])
 
     def test_doctor(self):
         done = stillmap("doctor", "--source", SMALL, "--out", self.out)
