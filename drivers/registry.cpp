@@ -4,6 +4,7 @@
 #include "drivers/dataset/tum_source.hpp"
 #include "drivers/recording/log_source.hpp"
 #include "drivers/synthetic/synthetic_source.hpp"
+#include "drivers/v4l2/v4l2_source.hpp"
 
 namespace stillmap {
 namespace {
@@ -37,6 +38,10 @@ Opened log(const std::string& path, const SourceOptions& options) {
   return std::unique_ptr<FrameSource>(std::move(*source));
 }
 
+Opened v4l2(const std::string& nodes, const SourceOptions& options) {
+  return open_v4l2(nodes, options.camera);
+}
+
 constexpr Scheme kSchemes[] = {
     {"tum", "tum:DIR", tum},
     {"sevenscenes", "sevenscenes:DIR", sevenscenes},
@@ -44,7 +49,7 @@ constexpr Scheme kSchemes[] = {
     {"log", "log:FILE", log},
     {"xtion", "xtion[:SERIAL]", nullptr},
     {"oni", "oni:FILE", nullptr},
-    {"v4l2", "v4l2:DEPTH_DEV[,COLOUR_DEV]", nullptr},
+    {"v4l2", "v4l2:DEPTH_DEV[,COLOUR_DEV]", v4l2},
 };
 
 std::string schemes_of_this_build() {
