@@ -15,7 +15,7 @@ packages=(
 )
 # the virtual machine for tests of drivers (toolchain/vm)
 if [[ "$(uname -m)" == x86_64 ]]; then
-  packages+=(qemu-system-x86 seabios busybox-static cpio kmod xz-utils v4l-utils gpiod)
+  packages+=(qemu-system-x86 seabios busybox-static cpio kmod xz-utils gpiod)
 fi
 if [[ "${1:-}" == --lint ]]; then
   packages+=(clang-14 clang-format-14 clang-tidy-14)
