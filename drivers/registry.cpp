@@ -5,6 +5,7 @@
 #include "drivers/openni2/openni2_source.hpp"
 #include "drivers/recording/log_source.hpp"
 #include "drivers/synthetic/synthetic_source.hpp"
+#include "drivers/v4l2/v4l2_source.hpp"
 
 namespace stillmap {
 namespace {
@@ -51,6 +52,10 @@ Opened oni(const std::string& path, const SourceOptions& options) {
 constexpr auto xtion = nullptr, oni = nullptr;
 #endif
 
+Opened v4l2(const std::string& nodes, const SourceOptions& options) {
+  return open_v4l2(nodes, options.camera);
+}
+
 constexpr Scheme kSchemes[] = {
     {"tum", "tum:DIR", tum},
     {"sevenscenes", "sevenscenes:DIR", sevenscenes},
@@ -58,7 +63,7 @@ constexpr Scheme kSchemes[] = {
     {"log", "log:FILE", log},
     {"xtion", "xtion[:SERIAL]", xtion, false},
     {"oni", "oni:FILE", oni},
-    {"v4l2", "v4l2:DEPTH_DEV[,COLOUR_DEV]", nullptr},
+    {"v4l2", "v4l2:DEPTH_DEV[,COLOUR_DEV]", v4l2},
 };
 
 std::string schemes_of_this_build() {

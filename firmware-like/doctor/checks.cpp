@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <optional>
 #include <sstream>
+#include <string_view>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -111,17 +113,44 @@ Findings check_xtion(const Machine& machine) {
   return found;
 }
 
+std::string video_node_text(const Machine& machine, const std::string& node) {
+  const std::string said = machine.video_node ? machine.video_node(machine.root + node) : std::string();
+  return said.empty() ? node : fmt::format("{}: {}", node, said);
+}
+
+bool is_video_node(const std::string& path) {
+  constexpr std::string_view kVideo = "/dev/video";
+  return path.size() > kVideo.size() && path.starts_with(kVideo) &&
+         path.find_first_not_of("0123456789", kVideo.size()) == std::string::npos;
+}
+
+/// Video nodes that nobody asked for: what there is to choose from.
+Findings other_video_nodes(const Machine& machine, const std::vector<std::string>& asked) {
+  Findings found;
+  for (const std::string& node : machine.list("/dev")) {
+    if (!is_video_node(node) || std::find(asked.begin(), asked.end(), node) != asked.end()) continue;
+    if (machine.may_use(machine.root + node))
+      found.push_back(ok("video node", video_node_text(machine, node)));
+    else
+      found.push_back(ok("video node", node + ": not for this user; " + kJoinVideo));
+  }
+  return found;
+}
+
 Findings check_v4l2(const Machine& machine, const std::string& nodes) {
   Findings found;
+  std::vector<std::string> asked;
   std::istringstream in(nodes);
   for (std::string node; std::getline(in, node, ',');) {
+    asked.push_back(node);
     if (!machine.exists(node))
       found.push_back(wrong("camera", node + " is not there", "v4l2-ctl --list-devices"));
     else if (!machine.may_use(machine.root + node))
       found.push_back(wrong("camera", node + " cannot be opened by this user", kJoinVideo));
     else
-      found.push_back(ok("camera", node));
+      found.push_back(ok("camera", video_node_text(machine, node)));
   }
+  for (Finding& other : other_video_nodes(machine, asked)) found.push_back(std::move(other));
   return found;
 }
 
@@ -207,6 +236,7 @@ Findings check_cameras(const Machine& machine, const RunIntent& intent) {
   constexpr std::string_view kV4l2 = "v4l2:";
   if (intent.source == "xtion" || intent.source.starts_with("xtion:")) return check_xtion(machine);
   if (intent.source.starts_with(kV4l2)) return check_v4l2(machine, intent.source.substr(kV4l2.size()));
+  if (intent.source.empty()) return other_video_nodes(machine, {});
   return {};
 }
 

@@ -33,7 +33,8 @@ struct RunIntent {
   uint64_t planned_bytes = 0;  ///< total of the memory plan
 };
 
-/// Cameras of the source: there, fast enough, and permitted. Nothing for recordings.
+/// Cameras of the source: there, fast enough, and permitted. Nothing for recordings; without a source, and
+/// beside those of `v4l2:`, the video nodes that there are.
 Findings check_cameras(const Machine& machine, const RunIntent& intent);
 /// Enough memory for the plan.
 Findings check_memory(const Machine& machine, const RunIntent& intent);

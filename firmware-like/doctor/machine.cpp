@@ -9,6 +9,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "drivers/v4l2/node_description.hpp"
+
 namespace stillmap {
 namespace {
 
@@ -31,6 +33,11 @@ std::optional<uint64_t> free_bytes_of(const std::string& folder) {
   struct statvfs disk {};
   if (statvfs(folder.c_str(), &disk) != 0) return {};
   return uint64_t{disk.f_bavail} * uint64_t{disk.f_frsize};
+}
+
+std::string video_node_text(const std::string& path) {
+  const auto node = describe_node(kernel_calls(), path);
+  return node ? summary_text(*node) : std::string();
 }
 
 }  // namespace
@@ -75,6 +82,7 @@ Machine this_machine() {
   machine.locked_limit_bytes = [] { return is_root() ? Machine::kUnlimited : limit(RLIMIT_MEMLOCK); };
   machine.clock_synchronised = synchronised;
   machine.free_bytes = free_bytes_of;
+  machine.video_node = video_node_text;
   return machine;
 }
 

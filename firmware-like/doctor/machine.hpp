@@ -19,6 +19,8 @@ struct Machine {
   std::function<uint64_t()> locked_limit_bytes;          ///< kUnlimited: as much as there is
   std::function<bool()> clock_synchronised;              ///< by NTP or PTP
   std::function<std::optional<uint64_t>(const std::string& folder)> free_bytes;
+  std::function<std::string(const std::string& path)>
+      video_node;  ///< name and formats; empty: it says nothing
 
   /// First line of a file, empty where it cannot be read.
   std::string line(const std::string& path) const;

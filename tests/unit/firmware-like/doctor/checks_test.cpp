@@ -156,6 +156,31 @@ TEST_F(Doctor, VideoNodes) {
   expect_only(Verdict::wrong, "camera", "/dev/video1 is not there", "v4l2-ctl");
 }
 
+TEST_F(Doctor, VideoNodesToChooseFrom) {
+  machine.video_node = [this](const std::string& path) {
+    return path == machine.root + "/dev/video0" ? "a camera; depth Z16" : "";
+  };
+  for (const char* node :
+       {"/dev/video0", "/dev/video2", "/dev/video10", "/dev/videoX", "/dev/video", "/dev/null"})
+    write(node, "");
+  forbidden = machine.root + "/dev/video10";
+  intent.source = "v4l2:/dev/video0";
+  const auto texts = [&] {
+    std::string text;
+    for (const Finding& finding : check_cameras(machine, intent)) {
+      EXPECT_EQ(finding.verdict, Verdict::ok);
+      text += finding.part + "=" + finding.text.substr(0, finding.text.find("; sudo")) + "|";
+    }
+    return text;
+  };
+  const std::string others = "video node=/dev/video10: not for this user|video node=/dev/video2|";
+  EXPECT_EQ(texts(), "camera=/dev/video0: a camera; depth Z16|" + others);
+  intent.source.clear();
+  EXPECT_EQ(texts(), "video node=/dev/video0: a camera; depth Z16|" + others);
+  intent.source = "tum:somewhere";
+  EXPECT_EQ(texts(), "");
+}
+
 TEST_F(Doctor, MemoryOfThePlan) {
   intent.planned_bytes = 2600 * kMegabyte;
   expect_only(Verdict::worse, "memory", "60 %", "map.pool_blocks");

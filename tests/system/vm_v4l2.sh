@@ -1,0 +1,37 @@
+# In the virtual machine (toolchain/vm/run.sh): the V4L2 driver, and the program with it, on the kernel's virtual cameras.
+#   vm_v4l2.sh V4L2_KERNEL_TEST STILLMAP
+set -euo pipefail
+test_program=$1 stillmap=$2
+guest=$(dirname "$0")/../../toolchain/vm/guest
+source "$guest/in_memory.sh"
+source "$guest/vivid.sh"
+
+expect() {  # TEXT FILE
+  grep -qF -- "$1" "$2" || { echo "expected '$1' in:"; cat "$2"; exit 1; }
+}
+
+in_memory "$test_program" "$stillmap"
+vivid_load 2
+"$test_program" --gtest_brief=1
+
+echo "== stillmap run"
+nodes=v4l2:/dev/video0,/dev/video1
+size=(--camera 260,260,159.5,89.5 --depth-scale 20000 --set source.cols=320 --set source.rows=180)
+"$stillmap" run --source $nodes "${size[@]}" --set map.pool_blocks=20000 --set map.voxel_m=0.03 \
+  --set map.truncation_m=0.12 --lcm off --max-frames 20 --out out >run.txt 2>&1 || { cat run.txt; cat out/events.log; exit 1; }
+cat out/report.json; cat out/events.log
+! grep -q bad_frame out/events.log || { cat out/events.log; exit 1; }
+
+echo "== stillmap run on cameras that are not there, or unfit"
+code=0; "$stillmap" run --source v4l2:/dev/video7 "${size[@]}" --lcm off >refused.txt 2>&1 || code=$?
+[[ $code -eq 3 ]]
+expect "/dev/video7: No such file" refused.txt
+code=0; "$stillmap" run --source $nodes --lcm off >refused.txt 2>&1 || code=$?
+[[ $code -eq 2 ]]
+expect "--camera" refused.txt
+
+echo "== stillmap doctor"
+"$stillmap" doctor --source $nodes "${size[@]}" >doctor.txt || true
+cat doctor.txt
+expect "/dev/video0: vivid; depth Y16; colour YUYV RGB3 GREY" doctor.txt
+expect "$nodes opens, 320x180" doctor.txt
