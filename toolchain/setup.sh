@@ -13,6 +13,10 @@ packages=(
   liblcm-dev liblcm-bin libglib2.0-dev iproute2
   libgtest-dev libbenchmark-dev systemd valgrind
 )
+# the virtual machine for tests of drivers (toolchain/vm)
+if [[ "$(uname -m)" == x86_64 ]]; then
+  packages+=(qemu-system-x86 seabios busybox-static cpio kmod xz-utils v4l-utils gpiod)
+fi
 if [[ "${1:-}" == --lint ]]; then
   packages+=(clang-14 clang-format-14 clang-tidy-14)
 elif [[ "${1:-}" == --cross ]]; then
