@@ -19,7 +19,7 @@ read_option() { $box sed -n "s/.*$1=\([^ ]*\).*/\1/p" /host/proc/cmdline | $box 
 script=$(read_option stillmap.script)
 arguments=$(read_option stillmap.arguments)
 echo "VM-UP"
-# shellcheck disable=SC2086 -- the arguments are words
+# shellcheck disable=SC2086
 $box chroot /host /bin/bash -c 'cd /run/work && exec /bin/bash "$@"' bash "$script" $arguments
 echo "VM-EXIT $?"
 $box poweroff -f

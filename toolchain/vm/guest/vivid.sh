@@ -2,7 +2,7 @@
 #   vivid_load [COUNT]   that many (default 1) web cameras with a capture node each: /dev/video0, /dev/video1, ...
 #   vivid_unload         takes them all away; fails while a program has one open
 vivid_load() {
-  local count=${1:-1} each=0x1
+  local count=${1:-1}
   insmod "$STILLMAP_VM_MODULES/vivid.ko" n_devs="$count" no_error_inj=0 \
     node_types="$(vivid_list "$count" 0x1)" num_inputs="$(vivid_list "$count" 1)" input_types="$(vivid_list "$count" 0)" ||
     return 1
