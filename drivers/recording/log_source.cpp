@@ -167,6 +167,7 @@ Status LogSource::next(RgbdFrame& frame, int32_t /*timeout_ms*/) {
     return passed_over("frame " + std::to_string(message.sequence) + ": " + decoder_.error());
   }
   frame.truth_T_world_cam.reset();
+  frame.sonar_m = decision_.sonar_m;
   odometry_.begin_frame(decision_);
   return Status::ok;
 }

@@ -28,7 +28,7 @@ namespace {
 
 /// What was shed then is shed now.
 FrameWork work_of(const DecisionMessage& decision) {
-  return {decision.integrated, decision.shed == Shed::finest_level ? 1 : 0};
+  return {decision.integrated, decision.shed == Shed::finest_level ? 1 : 0, decision.sonar_m};
 }
 
 /// The configuration of the live run, but for what it wrote and where.

@@ -19,6 +19,9 @@ struct Machine {
   std::function<uint64_t()> locked_limit_bytes;          ///< kUnlimited: as much as there is
   std::function<bool()> clock_synchronised;              ///< by NTP or PTP
   std::function<std::optional<uint64_t>(const std::string& folder)> free_bytes;
+  /// What keeps a GPIO line from being taken, one line; empty: nothing. Null: this build has no
+  /// libgpiod.
+  std::function<std::string(const std::string& chip, int32_t line)> gpio_problem;
 
   /// First line of a file, empty where it cannot be read.
   std::string line(const std::string& path) const;
