@@ -4,6 +4,7 @@
 #include <chrono>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include "runtime/core/clock.hpp"
 #include "runtime/core/heap_guard.hpp"
@@ -41,7 +42,7 @@ void RangeStage::run() {
     else
       std::this_thread::sleep_for(std::chrono::nanoseconds(kWait_ns));
   }
-  if (is_open_) sensor_.set_stop(true);  // when it is refused the lines are gone, and with them the level
+  if (is_open_ && !line_high_) sensor_.set_stop(true);  // when it is refused the lines are gone, and with them the level
 }
 
 void RangeStage::open() {
@@ -53,14 +54,14 @@ void RangeStage::open() {
   if (was_gone_) ranger_.reopened(now);
 }
 
-/// The first time it is opened again at once, then less and less often. The reason is told once.
+/// The first time it is opened again at once, then less and less often. The reason is told once until edges come again.
 void RangeStage::give_up_for_a_while(Stamp now) {
   is_open_ = false;
   open_at_ns_ = now.ns + next_wait_ns_;
   next_wait_ns_ = std::clamp(2 * next_wait_ns_, kFirstWait_ns, kLongestWait_ns);
   state_.faults.hold(Fault::range_lost, now.ns);
-  if (was_gone_ && open_at_ns_ > now.ns + kFirstWait_ns) return;
   was_gone_ = true;
+  if (std::exchange(told_, true)) return;
   const Stamp frame{state_.last_stamp_ns.load(std::memory_order_relaxed)};
   queues_.notices.push(
       Notice::make(Notice::Kind::fault, frame, name_of(Fault::range_lost), sensor_.error()));
@@ -93,6 +94,7 @@ Status RangeStage::listen(Stamp now) {
   if (status == Status::timeout) return Status::ok;
   if (status != Status::ok) return status;
   next_wait_ns_ = 0;
+  told_ = false;
   take_a_rest(edge.stamp);
   if (const auto reading = ranger_.take(edge)) hand_on(*reading);
   return Status::ok;

@@ -51,7 +51,7 @@ class RangeStage {
   PublishQueue& to_publish_;
   RunState& state_;
   EchoRanger ranger_;
-  bool is_open_ = false, was_gone_ = false;
+  bool is_open_ = false, was_gone_ = false, told_ = false;
   bool line_high_ = true;
   int64_t open_at_ns_ = 0, next_wait_ns_ = 0;  ///< until it is opened again
   int64_t window_ns_ = 0;                      ///< that edges_ are counted in
