@@ -60,13 +60,17 @@ constexpr Scheme kSchemes[] = {
 };
 
 /// camera.calibration into the options that a source is opened with; the options' own camera and scale win.
-Result<Calibration> read_calibration(DatasetOptions& options) {
-  const auto file = find_calibration(options.calibration);
+Result<Calibration> read_calibration(SourceOptions& options) {
+  const auto file = find_calibration(options.dataset.calibration);
   if (!file) return Error{file.error(), file.error_kind()};
   auto calibration = load_calibration(*file);
   if (!calibration) return Error{calibration.error(), calibration.error_kind()};
-  if (!options.camera) options.camera = calibration->colour;
-  if (options.depth_units_per_m == 0) options.depth_units_per_m = calibration->depth_units_per_m;
+  const auto fill = [&](auto& said) {
+    if (!said.camera) said.camera = calibration->colour;
+    if (said.depth_units_per_m == 0) said.depth_units_per_m = calibration->depth_units_per_m;
+  };
+  fill(options.dataset);
+  fill(options.camera);
   return calibration;
 }
 
@@ -83,7 +87,7 @@ std::string size_problem(const Calibration& calibration, const SourceInfo& info,
 Opened open_calibrated(const Scheme& scheme, const std::string& rest, SourceOptions options) {
   std::optional<Calibration> calibration;
   if (!options.dataset.calibration.empty() && scheme.calibrates != Calibrates::nothing) {
-    auto read = read_calibration(options.dataset);
+    auto read = read_calibration(options);
     if (!read) return Error{read.error(), read.error_kind()};
     calibration = std::move(*read);
   }

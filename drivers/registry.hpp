@@ -4,6 +4,7 @@
 #include <string>
 
 #include "config/result.hpp"
+#include "drivers/camera/camera_options.hpp"
 #include "drivers/dataset/dataset_options.hpp"
 #include "runtime/ports/frame_source.hpp"
 
@@ -11,6 +12,7 @@ namespace stillmap {
 
 struct SourceOptions {
   DatasetOptions dataset;  ///< for recordings
+  CameraOptions camera;    ///< for cameras, and recordings of theirs
   int threads = 2;         ///< 1..64, of a source that computes its frames, the calling thread included
 };
 

@@ -57,6 +57,17 @@ SourceOptions source_options(const Config& config) {
   options.dataset.calibration = c.calibration;
   options.dataset.time_offset_ms = static_cast<double>(config.source.time_offset_ms);
   options.dataset.max_pair_ms = static_cast<double>(config.source.max_pair_ms);
+  const SourceConfig& source = config.source;
+  options.camera = {.cols = source.cols,
+                    .rows = source.rows,
+                    .rate_hz = source.rate_hz,
+                    .auto_exposure = c.auto_exposure,
+                    .auto_white_balance = c.auto_white_balance,
+                    .max_pair_ms = options.dataset.max_pair_ms,
+                    .time_offset_ms = options.dataset.time_offset_ms,
+                    .gone_s = static_cast<double>(source.gone_s),
+                    .camera = options.dataset.camera,
+                    .depth_units_per_m = c.depth_units_per_m};
   options.threads = config.runtime.threads;
   return options;
 }
