@@ -64,7 +64,8 @@ int stop_level() {
 /// What an HC-SR04 does: an echo of `width_us` to each trigger; 0: nothing.
 class Echoes {
  public:
-  Echoes(const std::string& sysfs, int64_t width_us) : width_us(width_us), thread_([this, sysfs] { run(sysfs); }) {}
+  Echoes(const std::string& sysfs, int64_t first_width_us)
+      : width_us(first_width_us), thread_([this, sysfs] { run(sysfs); }) {}
   ~Echoes() {
     stop_ = true;
     thread_.join();
@@ -266,7 +267,7 @@ TEST(SonarOnGpioSim, WhatIsWrongWithALineIsSaid) {
 }
 
 // The last: it takes the chip away.
-TEST(SonarOnGpioSim, ZAChipThatIsPulledOutComesBack) {
+TEST(SonarOnGpioSim, AChipThatIsPulledOutComesBack) {
   Running sonar(hc_sr04());
   {
     Echoes echoes(g_sysfs, 5800);
