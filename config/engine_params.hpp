@@ -6,8 +6,9 @@
 namespace stillmap {
 
 /// What the engine needs, from the configuration and from what the source says of its camera.
-/// config.camera, where set, wins over the source.
-inline EngineParams engine_params(const Config& config, CameraModel camera, float depth_units_per_m) {
+/// config.camera, where set, wins over the source. @param bias of the source's depth
+inline EngineParams engine_params(const Config& config, CameraModel camera, float depth_units_per_m,
+                                  const DepthBias& bias = {}) {
   const CameraConfig& c = config.camera;
   if (c.fx > 0) {
     camera.k = {c.fx, c.fy, c.cx, c.cy, camera.k.width, camera.k.height};
@@ -25,7 +26,8 @@ inline EngineParams engine_params(const Config& config, CameraModel camera, floa
           config.relocalise,
           config.runtime.threads,
           nullptr,
-          config.archive.dir.empty() ? 0.0f : kFetch_m};
+          config.archive.dir.empty() ? 0.0f : kFetch_m,
+          bias};
 }
 
 }  // namespace stillmap

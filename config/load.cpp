@@ -1,10 +1,7 @@
 #include "config/load.hpp"
 
-// With NDEBUG the library tells the optimiser that its assertions hold, and malformed files break one of
-// them: undefined behaviour. Like this its own error paths behind them are taken.
-#undef NDEBUG
-#define TOML_ASSERT(expr) static_assert(true)
-#include <toml++/toml.h>
+#include "config/toml_text.hpp"
+
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -18,7 +15,7 @@
 namespace stillmap {
 namespace {
 
-constexpr uint64_t kMaxFileBytes = 1 << 20;
+using toml_text::at_line;
 
 /// A problem with the value of a key; empty: none.
 using Complaint = std::string;
@@ -185,28 +182,6 @@ std::string unknown_key(std::string_view section, std::string_view key) {
 // --- TOML files
 // --------------------------------------------------------------------------------------------------
 
-std::string at_line(const std::string& file, const toml::source_region& source) {
-  return file + ":" + std::to_string(source.begin.line) + ": ";
-}
-
-std::string list(const std::vector<std::string>& lines) {
-  std::string text;
-  for (const std::string& line : lines) text += (text.empty() ? "" : "\n") + line;
-  return text;
-}
-
-/// The only place where the library throws.
-Result<toml::table> parse_toml(const std::string& text, const std::string& file) {
-  try {
-    return toml::parse(text);
-  } catch (const toml::parse_error& error) {
-    return Error{at_line(file, error.source()) + "not valid TOML: " + std::string(error.description()),
-                 ErrorKind::bad_usage};
-  } catch (const std::exception& error) {
-    return Error{file + ": not valid TOML: " + error.what(), ErrorKind::bad_usage};
-  }
-}
-
 void read_section(const std::string& file, std::string_view section, const toml::table& table, Config& config,
                   std::vector<std::string>& problems) {
   for (const auto& [toml_key, node] : table) {
@@ -236,80 +211,20 @@ Result<Config> read_config(const toml::table& root, const std::string& file) {
     else
       problems.push_back(where + section + " is a section: expected [" + section + "] with keys below it");
   }
-  if (!problems.empty()) return Error{list(problems), ErrorKind::bad_usage};
+  if (!problems.empty()) return Error{toml_text::list(problems), ErrorKind::bad_usage};
   return config;
-}
-
-// --- camera.toml
-// -------------------------------------------------------------------------------------------------
-
-constexpr const char* kCameraKeys = "fx, fy, cx, cy, distortion = [k1, k2, p1, p2, k3], depth_scale";
-
-/// A key that is none of ours but was meant to be: ignoring it would silently use the wrong camera.
-bool looks_misspelt(std::string_view key) {
-  constexpr size_t kTypos = 3;
-  for (const char* coefficient : {"k1", "k2", "k3", "p1", "p2"})
-    if (key == coefficient) return true;
-  return edit_distance(key.substr(0, 64), "distortion") <= kTypos ||
-         edit_distance(key.substr(0, 64), "depth_scale") <= kTypos;
-}
-
-Complaint read_number(const toml::node& node, double& out) {
-  const auto number = node.value<double>();
-  if (!number || node.is_boolean() || !std::isfinite(*number)) return "expected a finite number";
-  out = *number;
-  return {};
-}
-
-Complaint read_distortion(const toml::node& node, std::array<double, 5>& out) {
-  const toml::array* numbers = node.as_array();
-  if (!numbers || numbers->size() < 4 || numbers->size() > 5) return "expected [k1, k2, p1, p2, k3]";
-  for (size_t i = 0; i < numbers->size(); ++i)
-    if (const Complaint complaint = read_number(*numbers->get(i), out[i]); !complaint.empty())
-      return complaint;
-  return {};
-}
-
-Result<CameraFile> read_camera(const toml::table& root, const std::string& file) {
-  constexpr std::array<std::string_view, 4> kPinhole = {"fx", "fy", "cx", "cy"};
-  CameraFile camera;
-  std::array<double, 4> pinhole = {};
-  size_t pinhole_count = 0;
-  for (const auto& [toml_key, node] : root) {
-    const std::string_view key = toml_key.str();
-    Complaint complaint;
-    const auto* const which = std::find(kPinhole.begin(), kPinhole.end(), key);
-    if (which != kPinhole.end()) {
-      complaint = read_number(node, pinhole[static_cast<size_t>(which - kPinhole.begin())]);
-      ++pinhole_count;
-    } else if (key == "distortion") {
-      complaint = read_distortion(node, camera.distortion);
-    } else if (key == "depth_scale") {
-      complaint = read_number(node, camera.depth_scale);
-      if (complaint.empty() && !(camera.depth_scale > 0)) complaint = "expected units per metre, above 0";
-    } else if (looks_misspelt(key)) {
-      complaint = std::string("unknown key; expected ") + kCameraKeys;
-    }
-    if (!complaint.empty())
-      return Error{at_line(file, node.source()) + std::string(key) + ": " + complaint, ErrorKind::bad_usage};
-  }
-  if (pinhole_count == kPinhole.size())
-    camera.fx_fy_cx_cy = pinhole;
-  else if (pinhole_count > 0)
-    return Error{file + ": expected all of fx, fy, cx and cy, or none", ErrorKind::bad_usage};
-  return camera;
 }
 
 }  // namespace
 
 Result<Config> parse_config(const std::string& text, const std::string& name) {
-  const Result<toml::table> root = parse_toml(text, name);
+  const Result<toml::table> root = toml_text::parse(text, name);
   if (!root) return Error{root.error(), ErrorKind::bad_usage};
   return read_config(*root, name);
 }
 
 Result<Config> load_config(const std::string& path) {
-  const Result<std::string> text = read_file(path, kMaxFileBytes);
+  const Result<std::string> text = read_file(path, toml_text::kMaxFileBytes);
   if (!text) return Error{text.error(), ErrorKind::bad_usage};
   return parse_config(*text, path);
 }
@@ -332,14 +247,6 @@ Result<Done> apply_setting(Config& config, const std::string& setting) {
   if (!known) return refused(unknown_key(section, key));
   if (!complaint.empty()) return refused(complaint);
   return Done{};
-}
-
-Result<CameraFile> load_camera_file(const std::string& path) {
-  const Result<std::string> text = read_file(path, kMaxFileBytes);
-  if (!text) return Error{text.error(), ErrorKind::bad_usage};
-  const Result<toml::table> root = parse_toml(*text, path);
-  if (!root) return Error{root.error(), ErrorKind::bad_usage};
-  return read_camera(*root, path);
 }
 
 }  // namespace stillmap

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <array>
-#include <optional>
 #include <string>
 
 #include "config/config.hpp"
@@ -22,16 +20,5 @@ Result<Config> parse_config(const std::string& text, const std::string& name);
 /// Sets one value from the command line.
 /// @param setting "section.key=value"; names of a switch with or without quotes
 Result<Done> apply_setting(Config& config, const std::string& setting);
-
-/// What `camera.toml` beside a recording may say.
-struct CameraFile {
-  std::optional<std::array<double, 4>> fx_fy_cx_cy;  ///< pixels; all four or none
-  std::array<double, 5> distortion = {};             ///< k1 k2 p1 p2 k3, Brown-Conrady
-  double depth_scale = 0;                            ///< raw depth units in a metre; 0: not said
-};
-
-/// Keys fx, fy, cx, cy, distortion = [k1, k2, p1, p2, k3], depth_scale. Other keys are let be, unless they
-/// look like one of these misspelt. Whether the numbers make sense is the caller's to check.
-Result<CameraFile> load_camera_file(const std::string& path);
 
 }  // namespace stillmap

@@ -69,12 +69,57 @@ void check_camera(const CameraConfig& camera, Violations& out) {
     out.unless(value == 0, setting(name, value) + ": has no effect while camera.fx is 0; set camera.fx too");
 }
 
-void check_mount(const MountConfig& mount, Violations& out) {
+void check_pose(const char* name, const std::array<float, 7>& T, Violations& out) {
   constexpr float kRounding = 0.01f;
-  const std::array<float, 7>& T = mount.T_body_cam;
   const float length = std::sqrt(T[3] * T[3] + T[4] * T[4] + T[5] * T[5] + T[6] * T[6]);
-  out.unless(std::abs(length - 1.0f) <= kRounding,
-             "mount.T_body_cam: the length of the quaternion is " + float_text(length) + ", must be 1");
+  out.unless(
+      std::abs(length - 1.0f) <= kRounding,
+      std::string(name) + ": the length of the quaternion is " + float_text(length) + ", must be 1");
+}
+
+/// Rules between the keys of the sonar. With kind none they have no effect, but for who waits for a stop.
+void check_sonar(const SonarConfig& sonar, Violations& out) {
+  const auto line = [](const char* name, int32_t number) {
+    return std::string("sonar.") + name + " = " + std::to_string(number);
+  };
+  if (sonar.kind == SonarKind::none) {
+    out.unless(sonar.stop_line < 0,
+               line("stop_line", sonar.stop_line) + ": has no effect while sonar.kind is none");
+    return;
+  }
+  const bool triggers = sonar.kind == SonarKind::hc_sr04;
+  out.unless(!sonar.chip.empty(), "sonar.chip = \"\": expected a GPIO chip such as \"/dev/gpiochip0\"");
+  out.unless(sonar.echo_line >= 0, line("echo_line", sonar.echo_line) + ": the sonar needs an echo line");
+  out.unless(triggers == (sonar.trigger_line >= 0),
+             line("trigger_line", sonar.trigger_line) +
+                 (triggers ? ": sonar.kind = hc_sr04 needs a trigger line"
+                           : ": has no effect with sonar.kind = pulse_width; set -1"));
+  const std::pair<const char*, int32_t> lines[] = {{"trigger_line", sonar.trigger_line},
+                                                   {"echo_line", sonar.echo_line},
+                                                   {"stop_line", sonar.stop_line}};
+  for (size_t i = 0; i < std::size(lines); ++i)
+    for (size_t j = 0; j < i; ++j)
+      out.unless(lines[i].second < 0 || lines[i].second != lines[j].second,
+                 line(lines[i].first, lines[i].second) + ": is sonar." + lines[j].first + " as well");
+  out.unless(sonar.min_m < sonar.max_m, setting("sonar.min_m", sonar.min_m) +
+                                            ": must be below sonar.max_m = " + float_text(sonar.max_m));
+  out.unless(sonar.stop_m <= sonar.max_m,
+             setting("sonar.stop_m", sonar.stop_m) +
+                 ": must be at most sonar.max_m = " + float_text(sonar.max_m) + ", or it is never free to go");
+  out.unless(sonar.stop_line < 0 || sonar.stop_m > sonar.min_m,
+             setting("sonar.stop_m", sonar.stop_m) + ": must be above sonar.min_m = " +
+                 float_text(sonar.min_m) + ", or sonar.stop_line never says stop");
+  constexpr float kSlowestSound_m_s = 300;  // colder than it gets
+  out.unless(!triggers || sonar.rate_hz * 2 * sonar.max_m < kSlowestSound_m_s,
+             setting("sonar.rate_hz", sonar.rate_hz) + ": allowed below " +
+                 float_text(kSlowestSound_m_s / (2 * sonar.max_m)) +
+                 ", or an echo from sonar.max_m comes after the next trigger");
+  out.unless(sonar.lost_s * sonar.rate_hz >= 2, setting("sonar.lost_s", sonar.lost_s) +
+                                                    ": must be at least twice 1 / sonar.rate_hz = " +
+                                                    float_text(2 / sonar.rate_hz));
+  out.unless(sonar.max_age_s * sonar.rate_hz >= 0.5f,
+             setting("sonar.max_age_s", sonar.max_age_s) + ": must be at least half of 1 / sonar.rate_hz = " +
+                 float_text(0.5f / sonar.rate_hz) + ", or there are frames that no reading speaks for");
 }
 
 void check_depth(const Config& config, Violations& out) {
@@ -149,7 +194,9 @@ std::vector<std::string> violations(const Config& config) {
   check_ranges(config, out);
   check_camera(config.camera, out);
   check_source(config.source, out);
-  check_mount(config.mount, out);
+  check_pose("mount.T_body_cam", config.mount.T_body_cam, out);
+  check_pose("sonar.T_cam_sonar", config.sonar.T_cam_sonar, out);
+  check_sonar(config.sonar, out);
   check_depth(config, out);
   check_track(config, out);
   check_map(config.map, out);

@@ -10,6 +10,7 @@
 #include "kernels/base/status.hpp"
 #include "kernels/base/view.hpp"
 #include "kernels/params.hpp"
+#include "kernels/prepare/depth_bias.hpp"
 
 namespace stillmap {
 
@@ -27,6 +28,7 @@ struct EngineParams {
   /// CPU engine: called by each worker, with true when it starts and with false before it ends; may be null.
   void (*on_worker)(bool starts) = nullptr;
   float fetch_m = 0;  ///< with an archive: so near to the view its groups are wanted back
+  DepthBias depth_bias = {};
 };
 
 /// One line of the memory plan.

@@ -18,7 +18,7 @@ SUFFIXES = {".hpp", ".cpp", ".cu", ".cuh", ".h", ".inc"}
 HARDWARE = [
     (re.compile(r"OpenNI|Driver/OniDriver|openni2/"), "drivers/openni2"),
     (re.compile(r"linux/videodev2\.h|libv4l2"), "drivers/v4l2"),
-    (re.compile(r"gpiod\.h"), "drivers/gpio"),
+    (re.compile(r"gpiod\.h|linux/gpio\.h"), "drivers/gpio"),
     (re.compile(r"lcm/|lcm-cpp|lcm\.h"), "drivers/lcm"),
 ]
 

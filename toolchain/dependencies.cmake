@@ -13,6 +13,7 @@ if(NOT STILLMAP_PARITY_ONLY)
   pkg_check_modules(systemd REQUIRED IMPORTED_TARGET libsystemd)
   pkg_check_modules(cairo REQUIRED IMPORTED_TARGET cairo)
   pkg_check_modules(openni2 IMPORTED_TARGET libopenni2)  # without it: no xtion, no oni
+  pkg_check_modules(gpiod QUIET IMPORTED_TARGET libgpiod)  # the sonar; left out where it is not there
   if(STILLMAP_BUILD_TESTS)  # what ours is compared with; the program itself needs none of it
     pkg_check_modules(lcm REQUIRED IMPORTED_TARGET lcm)
     find_program(LCM_GEN lcm-gen REQUIRED)

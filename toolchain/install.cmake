@@ -6,6 +6,8 @@ set(documents ${CMAKE_INSTALL_DATADIR}/doc/stillmap)
 install(TARGETS stillmap RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT program)
 install(DIRECTORY config/presets/ DESTINATION ${CMAKE_INSTALL_DATADIR}/stillmap/presets COMPONENT program
   FILES_MATCHING PATTERN "*.toml")
+install(DIRECTORY config/calibrations/ DESTINATION ${CMAKE_INSTALL_DATADIR}/stillmap/calibrations COMPONENT program
+  FILES_MATCHING PATTERN "*.toml")
 install(DIRECTORY drivers/lcm/types/ DESTINATION ${CMAKE_INSTALL_DATADIR}/stillmap/lcm COMPONENT program
   FILES_MATCHING PATTERN "*.lcm")
 install(FILES README.md docs/DEPLOY.md docs/PAPER.md docs/RESULTS.md DESTINATION ${documents} COMPONENT program)

@@ -10,7 +10,7 @@ packages=(
   build-essential ca-certificates cmake git ninja-build pkg-config python3
   libeigen3-dev libfmt-dev libcli11-dev nlohmann-json3-dev libtomlplusplus-dev libnanoflann-dev
   libspng-dev libsystemd-dev libturbojpeg0-dev libzstd-dev libcairo2-dev fonts-dejavu-core
-  liblcm-dev liblcm-bin libglib2.0-dev iproute2 libopenni2-dev
+  liblcm-dev liblcm-bin libglib2.0-dev iproute2 libopenni2-dev libgpiod-dev
   libgtest-dev libbenchmark-dev systemd valgrind
 )
 # the virtual machine for tests of drivers (toolchain/vm)

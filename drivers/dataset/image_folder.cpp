@@ -70,6 +70,8 @@ Result<std::unique_ptr<FrameSource>> ImageFolderSource::open(std::string name,
   source->info_.camera.k.width = size->cols;
   source->info_.camera.k.height = size->rows;
   source->info_.depth_units_per_m = camera.depth_units_per_m;
+  source->info_.depth_bias = camera.depth_bias;
+  source->info_.depth_camera = camera.depth_camera;
   source->info_.frames = static_cast<int64_t>(entries.size());
   source->entries_ = std::move(entries);
   if (const std::string problem = camera_problem(source->info_.camera); !problem.empty())

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "config/load.hpp"
+#include "config/calibration.hpp"
 #include "config/validate.hpp"
 #include "drivers/dataset/text.hpp"
 
@@ -36,14 +36,6 @@ Error bad(std::string message) {
   return {std::move(message), ErrorKind::bad_usage};
 }
 
-CameraModel model_of(const CameraFile& file) {
-  const auto& pinhole = *file.fx_fy_cx_cy;
-  const auto& d = file.distortion;
-  const auto f = [](double x) { return static_cast<float>(x); };
-  return {{f(pinhole[0]), f(pinhole[1]), f(pinhole[2]), f(pinhole[3]), 0, 0},
-          {f(d[0]), f(d[1]), f(d[2]), f(d[3]), f(d[4])}};
-}
-
 /// fx 0 cx; 0 fy cy; 0 0 1
 Result<CameraModel> read_matrix(const std::string& path) {
   const Result<TextFile> file = TextFile::read(path);
@@ -71,11 +63,11 @@ std::string folder_name(const std::string& dir) {
 
 /// Intrinsics of the first place that has them.
 Result<DatasetCamera> first_found(const std::string& dir, const DatasetOptions& options,
-                                  const CameraDefaults& defaults, const CameraFile& file) {
+                                  const CameraDefaults& defaults, const Calibration& file) {
   const std::filesystem::path folder(dir);
   const std::string matrix = (folder / "camera-intrinsics.txt").string();
   if (options.camera) return DatasetCamera{*options.camera, 0, "--camera"};
-  if (file.fx_fy_cx_cy) return DatasetCamera{model_of(file), 0, (folder / "camera.toml").string()};
+  if (file.colour) return DatasetCamera{*file.colour, 0, (folder / "camera.toml").string()};
   if (is_there(matrix)) {
     const Result<CameraModel> model = read_matrix(matrix);
     if (!model) return bad(model.error());
@@ -100,10 +92,10 @@ std::optional<CameraModel> camera_by_folder_name(const std::string& folder_name)
 
 Result<DatasetCamera> find_camera(const std::string& dir, const DatasetOptions& options,
                                   const CameraDefaults& defaults) {
-  CameraFile file;
+  Calibration file;
   const std::string toml = (std::filesystem::path(dir) / "camera.toml").string();
   if (is_there(toml)) {
-    const Result<CameraFile> loaded = load_camera_file(toml);
+    const Result<Calibration> loaded = load_calibration(toml, OtherKeys::let_be);
     if (!loaded) return bad(loaded.error());
     file = *loaded;
   }
@@ -113,10 +105,12 @@ Result<DatasetCamera> find_camera(const std::string& dir, const DatasetOptions& 
     return bad(camera->origin + ": " + problem);
 
   camera->depth_units_per_m = defaults.depth_units_per_m;
-  if (file.depth_scale > 0) camera->depth_units_per_m = static_cast<float>(file.depth_scale);
+  if (file.depth_units_per_m > 0) camera->depth_units_per_m = file.depth_units_per_m;
   if (options.depth_units_per_m != 0) camera->depth_units_per_m = options.depth_units_per_m;
   if (!(camera->depth_units_per_m > 0) || !std::isfinite(camera->depth_units_per_m))
     return bad(dir + ": the depth scale must be a finite number of units per metre above 0");
+  camera->depth_bias = file.depth_bias;
+  camera->depth_camera = file.depth;
   return camera;
 }
 

@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 
+#include "config/calibration.hpp"
 #include "config/result.hpp"
 #include "drivers/dataset/dataset_options.hpp"
 #include "kernels/base/pinhole.hpp"
@@ -14,6 +15,8 @@ struct DatasetCamera {
   CameraModel model;
   float depth_units_per_m = 0;
   std::string origin;  ///< where the intrinsics are from, for messages
+  DepthBias depth_bias = {};
+  std::optional<DepthCamera> depth_camera = {};  ///< none: depth is registered
 };
 
 /// What a kind of recording falls back to.

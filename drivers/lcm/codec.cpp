@@ -27,14 +27,23 @@ constexpr uint64_t kFingerprint<CommandMessage> = 0x1a187596c10f0700;
 template <>
 constexpr uint64_t kFingerprint<FrameMessage> = 0xe55d6bb0fd38e560;
 template <>
-constexpr uint64_t kFingerprint<DecisionMessage> = 0x58644e1b0cab23bd;
+constexpr uint64_t kFingerprint<DecisionMessage> = 0xa07c902f4788300a;
 template <>
-constexpr uint64_t kFingerprint<SessionMessage> = 0x534fa6b20e22fff9;
+constexpr uint64_t kFingerprint<SessionMessage> = 0x8d536f0dbff685c8;
 template <>
 constexpr uint64_t kFingerprint<EventMessage> = 0x772f33c0be0c70c9;
 
+/// What an event log may hold that an older program wrote: the same type without its last member.
+template <class Message>
+constexpr uint64_t kOlderFingerprint = kFingerprint<Message>;
+template <>
+constexpr uint64_t kOlderFingerprint<DecisionMessage> = 0x58644e1b0cab23bd;
+template <>
+constexpr uint64_t kOlderFingerprint<SessionMessage> = 0x534fa6b20e22fff9;
+
 /// Of fault_count on the wire: a bit each in faults_latched.
 constexpr uint32_t kMostFaults = 64;
+constexpr float kFarthest_m = 1e3f;  ///< that any sonar reaches
 constexpr size_t kAnyLength = 1 << 20;
 constexpr size_t kLongestEventName = 64, kLongestEventText = 1000;
 
@@ -142,6 +151,9 @@ void members(Wire& wire, M& m) {
   for (auto& answer : m.odometry) wire.number(answer.asked.ns);
   for (auto& answer : m.odometry) wire.number(answer.sample.stamp.ns);
   for (auto& answer : m.odometry) pose(wire, answer.sample.T_odom_body);
+  if (wire.older) return;
+  wire.number(m.sonar_m);
+  wire.require(m.sonar_m >= 0 && m.sonar_m < kFarthest_m);
 }
 
 template <class Wire, Is<SessionMessage> M>
@@ -157,6 +169,7 @@ void members(Wire& wire, M& m) {
   wire.number(m.depth_units_per_m);
   pose(wire, m.T_map_cam);
   wire.text(m.map, kAnyLength);
+  if (!wire.older) wire.numbers(m.depth_bias);
 }
 
 template <class Wire, Is<EventMessage> M>
@@ -180,7 +193,8 @@ Status decoded(View<const uint8_t> from, Message& message) {
   Reader wire(from);
   uint64_t fingerprint = 0;
   wire.number(fingerprint);
-  wire.require(fingerprint == kFingerprint<Message>);
+  wire.older = fingerprint != kFingerprint<Message>;
+  wire.require(!wire.older || fingerprint == kOlderFingerprint<Message>);
   Message read;
   members(wire, read);
   if (!wire.complete()) return Status::bad_data;

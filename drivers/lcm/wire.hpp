@@ -28,6 +28,9 @@ class Writer {
  public:
   explicit Writer(View<uint8_t> to) : to_(to) {}
 
+  /// Only what is read may be of an older program.
+  static constexpr bool older = false;
+
   uint32_t size() const { return fits_ ? at_ : 0; }
 
   template <class T>
@@ -86,6 +89,9 @@ class Writer {
 class Reader {
  public:
   explicit Reader(View<const uint8_t> from) : from_(from) {}
+
+  /// The type lacks the members that came last.
+  bool older = false;
 
   /// Every byte was read and every value is in its range.
   bool complete() const { return good_ && at_ == from_.size; }

@@ -73,6 +73,8 @@ std::string LogSource::start(const DatasetOptions& options) {
   info_.name = "log:" + path_;
   info_.camera = camera_of(session_);
   info_.depth_units_per_m = static_cast<float>(session_.depth_units_per_m);
+  std::transform(std::begin(session_.depth_bias), std::end(session_.depth_bias), info_.depth_bias.c,
+                 [](double c) { return static_cast<float>(c); });
   const Intrinsics k = info_.camera.k;
   if (options.camera) {
     info_.camera = *options.camera;
@@ -86,6 +88,8 @@ std::string LogSource::start(const DatasetOptions& options) {
            " pixels; 1 to " + std::to_string(kMaxImageSide) + " each way can be read";
   if (!(info_.depth_units_per_m > 0) || !std::isfinite(info_.depth_units_per_m))
     return path_ + ": the session's depth units in a metre must be above 0";
+  for (const float c : info_.depth_bias.c)
+    if (!std::isfinite(c)) return path_ + ": the session's bias of the depth must be finite numbers";
   const std::string problem = camera_problem(info_.camera);
   return problem.empty() ? problem : path_ + ": " + problem;
 }
@@ -167,6 +171,7 @@ Status LogSource::next(RgbdFrame& frame, int32_t /*timeout_ms*/) {
     return passed_over("frame " + std::to_string(message.sequence) + ": " + decoder_.error());
   }
   frame.truth_T_world_cam.reset();
+  frame.sonar_m = decision_.sonar_m;
   odometry_.begin_frame(decision_);
   return Status::ok;
 }

@@ -2,17 +2,43 @@
 #include <cstdio>
 #include <memory>
 #include <string>
+#include <vector>
 
+#include "config/calibration.hpp"
 #include "firmware-like/commands/command.hpp"
 #include "firmware-like/commands/common.hpp"
 
 namespace stillmap {
 namespace {
 
+/// What could be used, but is most likely wrong. @return as `check`
+Result<Done> check_plausible(const Config& config) {
+  std::string text;
+  const auto add = [&](const std::vector<std::string>& lines) {
+    for (const std::string& line : lines) text += "\n  " + line;
+  };
+  const CameraConfig& c = config.camera;
+  if (c.fx > 0)
+    add(implausible({{c.fx, c.fy, c.cx, c.cy, config.source.cols, config.source.rows},
+                     {c.k1, c.k2, c.p1, c.p2, c.k3}},
+                    "camera."));
+  if (!c.calibration.empty()) {
+    const auto file = find_calibration(c.calibration);
+    if (!file) return Error{file.error(), file.error_kind()};
+    const auto calibration = load_calibration(*file);
+    if (!calibration) return Error{calibration.error(), calibration.error_kind()};
+    add(implausible(*calibration, *file, config.source.cols, config.source.rows, config.depth));
+  }
+  if (text.empty()) return Done{};
+  return Error{"most likely wrong, though `stillmap run` would use it:" + text, ErrorKind::bad_usage};
+}
+
 int check_file(const std::string& path) {
   const auto config = read_config(path, {});
   if (!config) return fail(config.error(), config.error_kind());
   if (const auto good = check(*config); !good) return fail(path + ": " + good.error(), good.error_kind());
+  if (const auto good = check_plausible(*config); !good)
+    return fail(path + ": " + good.error(), good.error_kind());
   std::printf("%s: good\n", path.c_str());
   return kExitDone;
 }

@@ -55,6 +55,7 @@ SourceOptions source_options(const Config& config) {
   if (c.fx > 0)
     options.dataset.camera = CameraModel{{c.fx, c.fy, c.cx, c.cy, 0, 0}, {c.k1, c.k2, c.p1, c.p2, c.k3}};
   options.dataset.depth_units_per_m = c.depth_units_per_m;
+  options.dataset.calibration = c.calibration;
   options.dataset.time_offset_ms = static_cast<double>(config.source.time_offset_ms);
   options.dataset.max_pair_ms = static_cast<double>(config.source.max_pair_ms);
   const SourceConfig& source = config.source;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "config/engine_params.hpp"
+#include "drivers/gpio/gpio_sonar.hpp"
 #include "firmware-like/commands/command.hpp"
 #include "firmware-like/commands/common.hpp"
 #include "firmware-like/doctor/checks.hpp"
@@ -60,7 +61,8 @@ Findings examine(const DoctorOptions& o) {
 
   Findings found = {{Verdict::ok, "configuration", o.config.empty() ? "the defaults" : o.config, {}}};
   SourceInfo info = usual_camera();
-  const Machine machine = this_machine();
+  Machine machine = this_machine();
+  if (!gpio_library().empty()) machine.gpio_problem = sonar_line_problem;
   // First the camera, then whether it opens: the reason stands above the failure.
   for (Finding& finding : check_cameras(machine, intent)) found.push_back(std::move(finding));
   if (!o.source.empty()) found.push_back(check_source(intent, info));

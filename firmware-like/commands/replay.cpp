@@ -29,7 +29,7 @@ namespace {
 
 /// What was shed then is shed now.
 FrameWork work_of(const DecisionMessage& decision) {
-  return {decision.integrated, decision.shed == Shed::finest_level ? 1 : 0};
+  return {decision.integrated, decision.shed == Shed::finest_level ? 1 : 0, decision.sonar_m};
 }
 
 /// The configuration of the live run, but for what it wrote and where.
@@ -147,7 +147,8 @@ int replay(const std::string& log, const std::string& out, bool quiet) {
   const auto config = config_of(source, log, out);
   if (!config) return fail(config.error(), config.error_kind());
 
-  const EngineParams params = engine_params(*config, source.info().camera, source.info().depth_units_per_m);
+  const EngineParams params = engine_params(*config, source.info().camera, source.info().depth_units_per_m,
+                                            source.info().depth_bias);
   const MemoryPlan memory = plan_memory(*config, params);
   if (const auto fits = check_budget(memory); !fits) return fail(fits.error(), fits.error_kind());
   const std::unique_ptr<Engine> engine = make_cpu_engine(params);

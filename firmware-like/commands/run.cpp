@@ -15,6 +15,7 @@
 #include "config/describe.hpp"
 #include "config/engine_params.hpp"
 #include "config/memory_plan.hpp"
+#include "drivers/gpio/gpio_sonar.hpp"
 #include "drivers/lcm/lcm.hpp"
 #include "drivers/registry.hpp"
 #include "firmware-like/commands/command.hpp"
@@ -162,6 +163,12 @@ int exit_code_of(const RunEnd& end, const RunOutputs& outputs, const PipelineCou
   return kExitDone;
 }
 
+/// Null: there is none, or the frames are of another time than now.
+Result<std::unique_ptr<RangeSensor>> make_sonar(const SonarConfig& sonar, bool live) {
+  if (sonar.kind == SonarKind::none || !live) return std::unique_ptr<RangeSensor>();
+  return make_gpio_sonar(sonar);
+}
+
 Result<std::unique_ptr<BlockArchive>> open_archive(const Config& config) {
   if (config.archive.dir.empty()) return std::unique_ptr<BlockArchive>();
   return BlockArchive::open(archive_options(config));
@@ -199,6 +206,8 @@ SessionMessage session_of(const FrameSource& source, const RunPlan& plan, const 
   session.depth_units_per_m = wide(source.info().depth_units_per_m);
   session.T_map_cam = map && o.initial_pose.empty() ? map->info().T_map_cam : plan.T_map_cam;
   session.map = o.map;
+  std::transform(std::begin(source.info().depth_bias.c), std::end(source.info().depth_bias.c),
+                 session.depth_bias, wide);
   return session;
 }
 
@@ -206,7 +215,8 @@ SessionMessage session_of(const FrameSource& source, const RunPlan& plan, const 
 int run_with(FrameSource& source, const RunOptions& o, const RunPlan& plan, std::optional<MapFile>& map,
              Lcm& lcm, UtcClock& clock, ServiceManager* service, FrameObserver* observer) {
   const Config& config = plan.config;
-  EngineParams params = engine_params(config, source.info().camera, source.info().depth_units_per_m);
+  EngineParams params = engine_params(config, source.info().camera, source.info().depth_units_per_m,
+                                      source.info().depth_bias);
   params.on_worker = heap_guard::arm_worker;
   const std::string device = pick_device(o.device, o.quiet);
   const MemoryPlan memory = plan_memory(config, params, device);
@@ -229,6 +239,8 @@ int run_with(FrameSource& source, const RunOptions& o, const RunPlan& plan, std:
   SourceInfo info = source.info();
   info.camera = params.camera;
   const bool live = o.realtime || is_camera(o.source);
+  auto sonar = make_sonar(config.sonar, live);
+  if (!sonar) return fail(sonar.error(), sonar.error_kind());
   std::unique_ptr<MetricsServer> metrics;
   if (config.metrics.port > 0) {
     auto server = MetricsServer::open(config.metrics.port);
@@ -290,6 +302,7 @@ int run_with(FrameSource& source, const RunOptions& o, const RunPlan& plan, std:
   parts.bus = lcm.bus.get();
   parts.commands = lcm.commands.get();
   parts.service = service;
+  parts.sonar = sonar->get();
   parts.stop_requested = stop_requested;
   if (metrics) parts.on_status = [&metrics](const StatusMessage& status) { metrics->show(status); };
 

@@ -102,6 +102,10 @@ void RunOutputs::add(const Notice& notice) {
   }
 }
 
+void RunOutputs::add(const RangeReading& reading) {
+  if (log_) note_log(log_->write(maker_->range(reading)));
+}
+
 void RunOutputs::log_to(std::unique_ptr<LogRecorder> log, MessageMaker maker, const UtcClock& clock) {
   log_ = std::move(log);
   maker_.emplace(std::move(maker));

@@ -52,6 +52,7 @@ class RunOutputs final : public RunRecorder {
 
   void add(const RunItem& item, const RgbdFrame* frame, ImageView<const uint8_t> mask) override;
   void add(const Notice& notice) override;
+  void add(const RangeReading& reading) override;
   /// Rewrites the report once a minute.
   void idle() override;
   void event(Stamp stamp, const char* name, const std::string& text) { events_.info(stamp, name, text); }

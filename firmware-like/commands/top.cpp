@@ -33,6 +33,8 @@ class Heard {
       take(payload, view_.status, status_came_);
     else if (channel == kPoseChannel && take(payload, view_.pose, pose_came_))
       ++poses_;
+    else if (channel == kRangeChannel)
+      take(payload, view_.range, range_came_);
   }
 
   /// @param now later than at the call before, from which the rate counts
@@ -42,6 +44,7 @@ class Heard {
     view.seconds = seconds_between(start_, now);
     view.status_age_s = seconds_between(status_came_, now);
     view.pose_age_s = seconds_between(pose_came_, now);
+    view.range_age_s = seconds_between(range_came_, now);
     view.poses_per_s = poses_ / seconds_between(viewed_, now);
     viewed_ = now;
     poses_ = 0;
@@ -65,7 +68,7 @@ class Heard {
   const Clock::time_point start_ = Clock::now();
   std::mutex mutex_;
   TopView view_;
-  Clock::time_point status_came_ = start_, pose_came_ = start_, viewed_ = start_;
+  Clock::time_point status_came_ = start_, pose_came_ = start_, range_came_ = start_, viewed_ = start_;
   uint32_t poses_ = 0;  ///< since then
 };
 

@@ -78,6 +78,16 @@ std::string pose_text(const TopView& view) {
   return fmt::format("{}   {:.1f} a second", where, view.poses_per_s);
 }
 
+/// "0.42 m", and what else there is to say; empty: there is no sonar.
+std::string range_text(const TopView& view) {
+  if (!view.range) return {};
+  const RangeMessage& r = *view.range;
+  if (view.range_age_s > kSilenceS)
+    return fmt::format("none for {:.0f} s{}", view.range_age_s, r.stop ? ", the last said stop" : "");
+  const std::string where = r.range_m > 0 ? fmt::format("{:.2f} m", r.range_m) : std::string("no echo");
+  return where + (r.range_m > 0 && !r.valid ? ", not believed" : "") + (r.stop ? ", stop" : "");
+}
+
 std::string status_rows(const TopView& view) {
   const StatusMessage& s = *view.status;
   return row("mode", name_of(s.mode)) +
@@ -86,6 +96,7 @@ std::string status_rows(const TopView& view) {
          row("pose", pose_text(view)) +
          row("rate", fmt::format("{:.1f} frames a second   pose age {:.1f} ms   frame {}", s.rate_hz,
                                  s.pose_age_ms, s.frame)) +
+         (view.range ? row("range", range_text(view)) : std::string()) +
          row("stages",
              fmt::format("prepare {:.1f}  track {:.1f}  mask {:.1f}  refine {:.1f}  integrate {:.1f}  "
                          "total {:.1f} ms",
@@ -119,10 +130,11 @@ std::string top_line(const TopView& view) {
       "mask {:.1f} "
       "refine {:.1f} integrate {:.1f} total {:.1f} ms  map {:.0f} % full  dropped {} frames {} results  late "
       "{}  "
-      "left out: {}  faults: {}",
+      "left out: {}  {}faults: {}",
       name_of(s.mode), tracking(s), s.rate_hz, view.poses_per_s, s.pose_age_ms, s.prepare_ms, s.track_ms,
       s.mask_ms, s.refine_ms, s.integrate_ms, s.total_ms, 100 * s.map_fill, s.frames_dropped,
-      s.results_dropped, s.deadline_misses, name_of(s.shed), faults(s, ", "));
+      s.results_dropped, s.deadline_misses, name_of(s.shed),
+      view.range ? fmt::format("range: {}  ", range_text(view)) : std::string(), faults(s, ", "));
 }
 
 }  // namespace stillmap

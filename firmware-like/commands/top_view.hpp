@@ -14,7 +14,8 @@ struct TopView {
   double seconds = 0;     ///< since it listens
   std::optional<StatusMessage> status;
   std::optional<PoseMessage> pose;
-  double status_age_s = 0, pose_age_s = 0;  ///< since the last one came
+  std::optional<RangeMessage> range;
+  double status_age_s = 0, pose_age_s = 0, range_age_s = 0;  ///< since the last one came
   double poses_per_s = 0;                   ///< of late
   uint32_t foreign = 0;                     ///< messages on our channels that are none of ours
 };

@@ -240,6 +240,29 @@ Findings check_cameras(const Machine& machine, const RunIntent& intent) {
   return {};
 }
 
+Findings check_sonar(const Machine& machine, const RunIntent& intent) {
+  const SonarConfig& sonar = intent.config.sonar;
+  if (sonar.kind == SonarKind::none) return {};
+  constexpr const char* kMend = "ls -l /dev/gpiochip*; gpiodetect; gpioinfo";
+  // A run goes on without its sonar and says so; where one is configured that is no run as it was meant.
+  const auto without = [&](const std::string& why) {
+    return Findings{worse("sonar", why + "; a run says range_lost and looks for it", kMend)};
+  };
+  if (!machine.gpio_problem)
+    return {wrong("sonar", "this build has no libgpiod", "install libgpiod-dev and build again")};
+  if (!machine.exists(sonar.chip)) return without(sonar.chip + " is not there");
+  if (!machine.may_use(machine.root + sonar.chip))
+    return {worse("sonar", sonar.chip + " cannot be opened by this user; a run says range_lost",
+                  "sudo usermod -aG gpio $USER   (and log in again), with toolchain/udev/60-stillmap.rules "
+                  "in /etc/udev/rules.d")};
+  for (const int32_t line : {sonar.trigger_line, sonar.echo_line, sonar.stop_line}) {
+    if (line < 0) continue;
+    if (const std::string problem = machine.gpio_problem(sonar.chip, line); !problem.empty())
+      return without(problem);
+  }
+  return {ok("sonar", sonar.chip + ", its lines are free")};
+}
+
 Findings check_memory(const Machine& machine, const RunIntent& intent) {
   constexpr double kShare = 0.6;  // the rest is the system's, the camera's, and on a Jetson the GPU's
   const uint64_t available = meminfo_bytes(machine, "MemAvailable"),
@@ -372,6 +395,7 @@ Findings check_system(const Machine& machine, const RunIntent& intent) {
     all.insert(all.end(), std::move_iterator(some.begin()), std::move_iterator(some.end()));
   };
   add(check_memory(machine, intent));
+  add(check_sonar(machine, intent));
   add(check_real_time(machine, intent));
   add(check_processors(machine, intent));
   add(check_cuda(machine));

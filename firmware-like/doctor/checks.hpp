@@ -36,6 +36,8 @@ struct RunIntent {
 /// Cameras of the source: there, fast enough, and permitted. Nothing for recordings; without a source, and
 /// beside those of `v4l2:`, the video nodes that there are.
 Findings check_cameras(const Machine& machine, const RunIntent& intent);
+/// The lines of the sonar: there, free, and permitted. Nothing where there is none.
+Findings check_sonar(const Machine& machine, const RunIntent& intent);
 /// Enough memory for the plan.
 Findings check_memory(const Machine& machine, const RunIntent& intent);
 /// Priorities and locked memory that the configuration asks for.

@@ -21,6 +21,9 @@ struct Machine {
   std::function<std::optional<uint64_t>(const std::string& folder)> free_bytes;
   std::function<std::string(const std::string& path)>
       video_node;  ///< name and formats; empty: it says nothing
+  /// What keeps a GPIO line from being taken, one line; empty: nothing. Null: this build has no
+  /// libgpiod.
+  std::function<std::string(const std::string& chip, int32_t line)> gpio_problem;
 
   /// First line of a file, empty where it cannot be read.
   std::string line(const std::string& path) const;

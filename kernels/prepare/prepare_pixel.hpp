@@ -8,6 +8,7 @@
 #include "kernels/base/view.hpp"
 #include "kernels/map/voxel.hpp"
 #include "kernels/params.hpp"
+#include "kernels/prepare/depth_bias.hpp"
 
 namespace stillmap {
 
@@ -18,6 +19,13 @@ constexpr uint16_t kRawFar = 65535;  ///< like 0: no measurement
 STILLMAP_HD float metres_from_raw(uint16_t raw, float m_per_unit, float min_m) {
   const float z_m = static_cast<float>(raw) * m_per_unit;
   return (raw == 0) | (raw == kRawFar) | (z_m < min_m) ? 0.0f : z_m;
+}
+
+/// The same with the camera's bias taken out. @param max_m up to which the bias is known
+STILLMAP_HD float metres_from_raw(uint16_t raw, float m_per_unit, float min_m, const DepthBias& bias,
+                                  float max_m) {
+  const float z_m = bias.corrected(static_cast<float>(raw) * m_per_unit, max_m);
+  return (raw == 0) | (raw == kRawFar) | !(z_m >= min_m) ? 0.0f : z_m;
 }
 
 /// Bilinear colour at (u, v); black outside.                            test: prepare_test
@@ -49,6 +57,13 @@ struct PreparePass {
   float m_per_unit = 0;
   float min_m = 0;
   float max_m = 0;
+  DepthBias bias = {};
+  bool biased = false;  ///< whether `bias` is anything
+
+  STILLMAP_HD float metres(uint16_t raw) const {
+    return biased ? metres_from_raw(raw, m_per_unit, min_m, bias, max_m)
+                  : metres_from_raw(raw, m_per_unit, min_m);
+  }
 
   /// @return true when the depth lies in [min_m, max_m]
   STILLMAP_HD bool operator()(int32_t row, int32_t col) const {
@@ -64,7 +79,7 @@ struct PreparePass {
       raw = depth_raw.at(row, col);
       rgb = colour_raw.at(row, col);
     }
-    const float z_m = metres_from_raw(raw, m_per_unit, min_m);
+    const float z_m = metres(raw);
     depth_m.at(row, col) = z_m;
     colour.at(row, col) = rgb;
     luma_chroma_image.at(row, col) = luma_chroma(rgb);

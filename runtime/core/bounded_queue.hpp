@@ -25,6 +25,9 @@ class BoundedQueue {
     filled_.release();
     return true;
   }
+  /// Ends the wait of `pop_within`, empty-handed where there is nothing.  @thread any; neither waits nor
+  /// allocates
+  void wake() { filled_.release(); }
   /// @return false: empty.  @thread one, may be another than that of `push`; does not wait
   bool pop(T& item) { return filled_.try_acquire() && take(item); }
   /// @return false: nothing came within the time.  @thread as `pop`

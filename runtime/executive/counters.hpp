@@ -38,7 +38,7 @@ struct RunState {
   std::atomic<uint32_t> saves{0};          ///< of the map, since it was set to 0: kSaveDone or kSaveFailed
   std::atomic<int64_t> last_frame_ns{0};   ///< CLOCK_MONOTONIC, when the last frame was read
   std::atomic<int64_t> last_stamp_ns{0};   ///< of that frame, the source's clock
-  Heartbeat capture, real_time, publish, record;
+  Heartbeat capture, real_time, publish, record, sonar;
 };
 
 }  // namespace stillmap

@@ -63,16 +63,20 @@ Executive::Executive(ExecutiveParts parts, const Config& config, const Executive
           {options.max_frames, static_cast<double>(config.source.gone_s),
            static_cast<double>(config.source.reopen_s), static_cast<double>(config.source.reopen_max_s)}),
       loop_({p_.engine, p_.pipeline, capture_, slots_, mailbox_, p_.state, to_publish_, to_record_,
-             p_.archive, p_.map_keeper, p_.odometry, p_.observers},
+             p_.archive, p_.map_keeper, p_.odometry, p_.observers, &ranges_.to_loop},
             {static_cast<double>(config.lost.new_map_after_s), static_cast<double>(config.runtime.period_ms),
-             options.live, options.keep_images}),
-      publish_(MessageMaker(config, p_.clock, p_.state, options.T_map_cam), to_publish_, p_.state, p_.codec,
-               p_.bus),
-      record_(to_record_, capture_.notices(), notices_, slots_, p_.state, p_.recorder),
-      watched_{{{&p_.state.capture, "capture"},
-                {&p_.state.real_time, "real-time"},
-                {&p_.state.publish, "publish"},
-                {&p_.state.record, "record"}}} {}
+             options.live, static_cast<double>(config.sonar.max_age_s), options.keep_images}),
+      publish_(MessageMaker(config, p_.clock, p_.state, options.T_map_cam), to_publish_, ranges_.to_publish,
+               p_.state, p_.codec, p_.bus),
+      record_(to_record_, capture_.notices(), notices_, ranges_, slots_, p_.state, p_.recorder),
+      watched_{{&p_.state.capture, "capture"},
+               {&p_.state.real_time, "real-time"},
+               {&p_.state.publish, "publish"},
+               {&p_.state.record, "record"}} {
+  if (p_.sonar == nullptr) return;
+  sonar_.emplace(*p_.sonar, config.sonar, ranges_, to_publish_, p_.state);
+  watched_.push_back({&p_.state.sonar, "sonar"});
+}
 
 ThreadPlan Executive::plan(const char* name, int32_t priority, const std::string& cpus) const {
   // On a single CPU a FIFO thread that is never done would keep everybody else from it.
@@ -106,13 +110,15 @@ RunEnd Executive::run() {
   if (p_.service) p_.service->ready();
   heap_ = heap_guard::allocations();
   const RuntimeConfig& r = config_.runtime;
-  std::vector<std::jthread> recording, publishing, working, capturing;
+  std::vector<std::jthread> recording, publishing, working, capturing, ranging;
   start_thread(recording, plan("record", 0, r.other_cpus), [this] { record_.run(); });
   start_thread(publishing, plan("publish", r.publish_priority, r.other_cpus), [this] { publish_.run(); });
   start_thread(working, plan("real-time", r.realtime_priority, r.realtime_cpus), [this] {
     loop_.run();
     loop_done_.store(true, std::memory_order_release);
   });
+  if (sonar_)
+    start_thread(ranging, plan("sonar", r.publish_priority, r.other_cpus), [this] { sonar_->run(); });
   start_thread(capturing, plan("capture", r.capture_priority, r.other_cpus), [this] { capture_.run(); });
 
   while (!loop_done_.load(std::memory_order_acquire)) {
@@ -123,6 +129,7 @@ RunEnd Executive::run() {
   p_.state.stop.store(true, std::memory_order_relaxed);  // the capture waits for nobody any more
   working.clear();
   capturing.clear();
+  ranging.clear();
   supervise();
   publish_.finish();
   publishing.clear();

@@ -3,10 +3,10 @@
 // The threads of a run: capture, real-time, publish, record; and the caller's, which supervises.
 //
 //   source -> capture -> [mailbox] -> frame loop -> [queue] -> publish -> bus
-//                ^                        |-------> [queue] -> record  -> files
-//                +---- free slots --------+------------------------+
+//   sonar -> [queue] ---------------------^-------> [queue] -> record  -> files
+//                ^                                                 |
+//                +---- free slots ---------------------------------+
 
-#include <array>
 #include <atomic>
 #include <cstdint>
 #include <functional>
@@ -19,6 +19,7 @@
 
 #include "runtime/executive/frame_loop.hpp"
 #include "runtime/executive/publish_stage.hpp"
+#include "runtime/executive/range_stage.hpp"
 #include "runtime/executive/real_time.hpp"
 #include "runtime/executive/record_stage.hpp"
 #include "runtime/ports/service_manager.hpp"
@@ -40,6 +41,7 @@ struct ExecutiveParts {
   MessageBus* bus = nullptr;
   CommandPort* commands = nullptr;
   ServiceManager* service = nullptr;
+  RangeSensor* sonar = nullptr;
   std::vector<FrameObserver*> observers = {};
   std::function<bool()> stop_requested = {};  ///< a signal came
   /// Told of the newest status some times a second.  @thread supervisor
@@ -93,6 +95,7 @@ class Executive {
   const ExecutiveOptions options_;
   FrameSlots slots_;
   FrameMailbox mailbox_;
+  RangeQueues ranges_;
   PublishQueue to_publish_;
   RunQueue to_record_;
   NoticeQueue notices_;
@@ -100,6 +103,7 @@ class Executive {
   FrameLoop loop_;
   PublishStage publish_;
   RecordStage record_;
+  std::optional<RangeStage> sonar_;
   std::atomic<bool> loop_done_{false};
 
   // The supervisor's.
@@ -110,7 +114,7 @@ class Executive {
     int64_t since_ns = 0;
     bool stalled = false;
   };
-  std::array<Watched, 4> watched_;
+  std::vector<Watched> watched_;
   Mode mode_ = Mode::boot;
   Shed shed_ = Shed::nothing;
   uint64_t faults_told_ = 0;

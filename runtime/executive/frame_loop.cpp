@@ -23,6 +23,7 @@ uint64_t given_up(const MapHealth& m) {
 void FrameLoop::run() {
   while (!p_.state.stop.load(std::memory_order_relaxed)) {
     p_.state.real_time.beat();
+    take_ranges();
     // Asked before the look into the mailbox: what was put there before the end is found.
     const bool ended = p_.capture.ended();
     const int32_t slot = p_.mailbox.take(ended ? std::chrono::milliseconds(0) : kWait);
@@ -38,7 +39,7 @@ void FrameLoop::work_on(uint32_t slot) {
   FrameResult result;
   {
     const heap_guard::Scope armed;
-    const FrameWork work = limits_.live ? FrameWork{load_.integrate(), load_.finest_level()} : FrameWork{};
+    const FrameWork work = work_for(frame);
     decide(frame, work);
     if (p_.odometry) p_.odometry->begin_frame();
     result = p_.pipeline.process(frame, work, this);
@@ -58,6 +59,20 @@ void FrameLoop::work_on(uint32_t slot) {
   ++frames_;
 }
 
+/// Also while no frame comes: the queue is short.
+void FrameLoop::take_ranges() {
+  if (p_.ranges == nullptr) return;
+  for (RangeReading reading; p_.ranges->pop(reading);) ranges_.add(reading);
+}
+
+FrameWork FrameLoop::work_for(const RgbdFrame& frame) {
+  FrameWork work;
+  if (limits_.live) work = {load_.integrate(), load_.finest_level()};
+  take_ranges();
+  work.sonar_m = frame.sonar_m > 0 ? frame.sonar_m : ranges_.at(frame.captured);
+  return work;
+}
+
 /// What a replay has to know of this frame.
 void FrameLoop::decide(const RgbdFrame& frame, const FrameWork& work) {
   const bool new_map = decision_.new_map;
@@ -66,6 +81,7 @@ void FrameLoop::decide(const RgbdFrame& frame, const FrameWork& work) {
   decision_.used = true;
   decision_.shed = load_.shed();
   decision_.integrated = work.integrate;
+  decision_.sonar_m = work.sonar_m;
   decision_.new_map = new_map;
 }
 

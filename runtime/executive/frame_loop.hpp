@@ -10,9 +10,11 @@
 #include "runtime/executive/frame_slots.hpp"
 #include "runtime/executive/load.hpp"
 #include "runtime/executive/map_keeper.hpp"
+#include "runtime/executive/range_stage.hpp"
 #include "runtime/executive/run_item.hpp"
 #include "runtime/ports/frame_observer.hpp"
 #include "runtime/ports/frame_odometry.hpp"
+#include "runtime/range/range_history.hpp"
 
 namespace stillmap {
 
@@ -30,12 +32,14 @@ struct FrameLoopParts {
   MapKeeper* map_keeper = nullptr;        ///< null: the map is not saved on the way
   FrameOdometry* odometry = nullptr;      ///< that the pipeline asks; null: there is none
   std::vector<FrameObserver*> observers;  ///< measuring; they are outside of what real time is asked for
+  RangeQueue* ranges = nullptr;           ///< readings of the sonar; null: there is none
 };
 
 struct FrameLoopLimits {
   double new_map_after_s = 0;  ///< lost for so long, the map is given up (lost.new_map_after_s); 0: never
   double period_ms = 0;        ///< of the camera, the deadline; 0: by the stamps
   bool live = false;           ///< frames come at their own pace: what is late is counted, and work is shed
+  double range_max_age_s = 0;  ///< sonar.max_age_s
   bool keep_images = false;    ///< the record thread wants them; live, as long as there are slots
 };
 
@@ -43,7 +47,8 @@ struct FrameLoopLimits {
 /// @thread run: real-time; it does not allocate, lock, touch files, format text or throw (observers aside)
 class FrameLoop final : public PoseListener {
  public:
-  FrameLoop(const FrameLoopParts& parts, const FrameLoopLimits& limits) : p_(parts), limits_(limits) {}
+  FrameLoop(const FrameLoopParts& parts, const FrameLoopLimits& limits)
+      : p_(parts), limits_(limits), ranges_(limits.range_max_age_s) {}
 
   /// Until the capture has ended and its last frame is done, or a stop is asked for.
   void run();
@@ -56,6 +61,8 @@ class FrameLoop final : public PoseListener {
 
  private:
   void work_on(uint32_t slot);
+  void take_ranges();
+  FrameWork work_for(const RgbdFrame& frame);
   void decide(const RgbdFrame& frame, const FrameWork& work);
   void count_lateness(const FrameResult& result, const FrameWork& work);
   void note_faults(const FrameResult& result);
@@ -73,6 +80,7 @@ class FrameLoop final : public PoseListener {
   FrameLoopParts p_;
   const FrameLoopLimits limits_;
   LoadShedder load_;
+  RangeHistory ranges_;
   FrameResult last_;
   uint32_t frames_ = 0;
   uint32_t relocalised_ = 0;

@@ -59,7 +59,8 @@ MessageMaker::MessageMaker(const Config& config, const UtcClock& clock, const Ru
     : clock_(clock),
       state_(state),
       T_cam_body_(inverse(pose_of(config.mount.T_body_cam))),
-      T_local_map_(first_body_pose(config.mount.initial_rp_deg) * inverse(T_map_cam * T_cam_body_)) {}
+      T_local_map_(first_body_pose(config.mount.initial_rp_deg) * inverse(T_map_cam * T_cam_body_)),
+      max_range_m_(config.sonar.max_m) {}
 
 PoseMessage MessageMaker::pose(const PublishItem& item) {
   const FrameResult& r = item.result;
@@ -85,6 +86,10 @@ PoseMessage MessageMaker::pose(const PublishItem& item) {
   epoch_before_ = item.pose_epoch;
   have_before_ = true;
   return message;
+}
+
+RangeMessage MessageMaker::range(const RangeReading& reading) const {
+  return {{clock_.to_utc_us(reading.stamp.ns)}, reading.range_m, max_range_m_, reading.valid, reading.stop};
 }
 
 StatusMessage MessageMaker::status(const PublishItem& item, float pose_age_ms) {

@@ -8,6 +8,7 @@
 #include "runtime/executive/counters.hpp"
 #include "runtime/executive/run_item.hpp"
 #include "runtime/ports/messages.hpp"
+#include "runtime/ports/range_sensor.hpp"
 
 namespace stillmap {
 
@@ -27,6 +28,7 @@ class MessageMaker {
   PoseMessage pose(const PublishItem& item);
   /// @param pose_age_ms of this frame's pose when it was handed to the bus; 0: none was
   StatusMessage status(const PublishItem& item, float pose_age_ms);
+  RangeMessage range(const RangeReading& reading) const;
   /// Between frames: what is known without one.
   StatusMessage status_without_frame() const;
 
@@ -36,6 +38,7 @@ class MessageMaker {
   const UtcClock& clock_;
   const RunState& state_;
   const Se3d T_cam_body_, T_local_map_;
+  const float max_range_m_;
   Se3d T_local_body_before_;
   Stamp captured_before_;
   uint32_t epoch_before_ = 0;

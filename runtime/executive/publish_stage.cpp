@@ -21,6 +21,7 @@ void PublishStage::run() {
     const bool finish = finish_.load(std::memory_order_acquire);
     PublishItem item;
     const bool found = finish ? queue_.pop(item) : queue_.pop_within(item, kWait);
+    send_ranges();
     if (!found && finish) return;
     if (found) {
       take(item);
@@ -46,6 +47,10 @@ void PublishStage::take(const PublishItem& item) {
   const StatusMessage status = maker_.status(item, sent ? pose_age_ms_ : 0.0f);
   latest_.write(status);
   send(kStatusChannel, status);
+}
+
+void PublishStage::send_ranges() {
+  for (RangeReading reading; ranges_.pop(reading);) send(kRangeChannel, maker_.range(reading));
 }
 
 template <class Message>

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "runtime/executive/message_maker.hpp"
+#include "runtime/executive/range_stage.hpp"
 #include "runtime/ports/message_bus.hpp"
 #include "runtime/ports/message_codec.hpp"
 
@@ -33,15 +34,16 @@ class Latest {
   std::atomic<uint32_t> middle_{2};
 };
 
-/// Sends poses as they become known, and a status with every frame; between frames, twice a second.
+/// Sends poses and readings of the sonar as they become known, and a status with every frame; between frames,
+/// twice a second.
 /// @thread run: publish; it does not allocate, lock or throw. latest: supervisor
 class PublishStage {
  public:
-  /// @param codec, bus null: nothing is sent, the status is made all the same  @param queue, state outlive
-  /// this
-  PublishStage(MessageMaker maker, PublishQueue& queue, RunState& state, const MessageCodec* codec,
-               MessageBus* bus)
-      : maker_(maker), queue_(queue), state_(state), codec_(codec), bus_(bus) {}
+  /// @param codec, bus null: nothing is sent, the status is made all the same  @param queue, ranges, state
+  /// outlive this; who puts something into `ranges` wakes `queue`
+  PublishStage(MessageMaker maker, PublishQueue& queue, RangeQueue& ranges, RunState& state,
+               const MessageCodec* codec, MessageBus* bus)
+      : maker_(maker), queue_(queue), ranges_(ranges), state_(state), codec_(codec), bus_(bus) {}
 
   /// Until `finish` and the queue is empty.
   void run();
@@ -51,11 +53,13 @@ class PublishStage {
 
  private:
   void take(const PublishItem& item);
+  void send_ranges();
   template <class Message>
   void send(const char* channel, const Message& message);
 
   MessageMaker maker_;
   PublishQueue& queue_;
+  RangeQueue& ranges_;
   RunState& state_;
   const MessageCodec* const codec_;
   MessageBus* const bus_;

@@ -17,6 +17,7 @@ void RecordStage::run() {
     RunItem item;
     const bool found = finish ? queue_.pop(item) : queue_.pop_within(item, kWait);
     add_notices();
+    add_ranges();
     if (found) {
       const bool kept = item.slot != RunItem::kNoSlot;
       const auto slot = static_cast<uint32_t>(item.slot);
@@ -31,8 +32,12 @@ void RecordStage::run() {
 
 void RecordStage::add_notices() {
   Notice notice;
-  for (NoticeQueue* queue : {&from_capture_, &from_supervisor_})
+  for (NoticeQueue* queue : {&from_capture_, &from_supervisor_, &ranges_.notices})
     while (queue->pop(notice)) recorder_.add(notice);
+}
+
+void RecordStage::add_ranges() {
+  for (RangeReading reading; ranges_.to_record.pop(reading);) recorder_.add(reading);
 }
 
 }  // namespace stillmap

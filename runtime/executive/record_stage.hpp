@@ -4,6 +4,7 @@
 
 #include "runtime/executive/counters.hpp"
 #include "runtime/executive/frame_slots.hpp"
+#include "runtime/executive/range_stage.hpp"
 #include "runtime/executive/run_item.hpp"
 #include "runtime/ports/run_recorder.hpp"
 
@@ -14,11 +15,12 @@ namespace stillmap {
 class RecordStage {
  public:
   /// All outlive this.
-  RecordStage(RunQueue& queue, NoticeQueue& from_capture, NoticeQueue& from_supervisor, FrameSlots& slots,
-              RunState& state, RunRecorder& recorder)
+  RecordStage(RunQueue& queue, NoticeQueue& from_capture, NoticeQueue& from_supervisor, RangeQueues& ranges,
+              FrameSlots& slots, RunState& state, RunRecorder& recorder)
       : queue_(queue),
         from_capture_(from_capture),
         from_supervisor_(from_supervisor),
+        ranges_(ranges),
         slots_(slots),
         state_(state),
         recorder_(recorder) {}
@@ -29,10 +31,12 @@ class RecordStage {
 
  private:
   void add_notices();
+  void add_ranges();
 
   RunQueue& queue_;
   NoticeQueue& from_capture_;
   NoticeQueue& from_supervisor_;
+  RangeQueues& ranges_;
   FrameSlots& slots_;
   RunState& state_;
   RunRecorder& recorder_;

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "config/calibration.hpp"
 #include "kernels/base/pinhole.hpp"
 #include "kernels/base/se3.hpp"
 #include "kernels/base/status.hpp"
@@ -44,6 +45,9 @@ struct SourceInfo {
   std::string name;  ///< as given, for reports: "tum:DIR"
   CameraModel camera;
   float depth_units_per_m = 5000;
+  DepthBias depth_bias = {};                     ///< of the raw depth
+  std::optional<DepthCamera> depth_camera = {};  ///< of depth that is still to be registered to colour; none:
+                                                 ///< it is
   int64_t frames = -1;  ///< number of frames, -1: unknown (live)
   bool has_truth_mask = false;
 };

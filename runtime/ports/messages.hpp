@@ -119,6 +119,7 @@ struct DecisionMessage {
   uint32_t archive_answers = 0;  ///< that BlockArchive::step took after this frame
   uint32_t odometry_answers = 0;
   OdometryAnswer odometry[kOdometryAnswers];
+  float sonar_m = 0;  ///< that it was told (FrameWork::sonar_m)
 };
 
 /// What a log begins with: all that reading its frames needs. Wire: session_t.
@@ -132,6 +133,7 @@ struct SessionMessage {
   double depth_units_per_m = 0;
   Se3d T_map_cam;        ///< pose of the first frame, or where the camera is looked for first in `map`
   std::string_view map;  ///< the file that the run went on with; empty: none
+  double depth_bias[4] = {0, 1, 0, 0};  ///< DepthBias::c
 };
 
 inline constexpr uint32_t kEventNameBytes = 64, kEventTextBytes = 1000;

@@ -85,6 +85,7 @@ inline DecisionMessage decision() {
     m.odometry[i].asked.ns = 123456789012345 + i;
     m.odometry[i].sample = {Stamp{123456789000000 + i}, transform(0.1 * (i + 1))};
   }
+  m.sonar_m = 0.21f;
   return m;
 }
 
@@ -96,6 +97,7 @@ inline SessionMessage session() {
   for (int i = 0; i < 4; ++i) m.k[i] = 500.5 + i;
   for (int i = 0; i < 5; ++i) m.distortion[i] = -0.1 * i;
   m.depth_units_per_m = 5000;
+  for (int i = 0; i < 4; ++i) m.depth_bias[i] = 0.25 * (i + 1);
   m.T_map_cam = transform(0.3), m.map = "/maps/hall.smap";
   return m;
 }

@@ -119,7 +119,7 @@ class Package(unittest.TestCase):
         listed = call("dpkg-deb", "-c", self.package).stdout.splitlines()
         files = {line.split()[5].lstrip("."): line for line in listed if not line.startswith("d")}
         expected = ["/usr/bin/stillmap", "/usr/lib/systemd/system/stillmap.service", "/usr/lib/udev/rules.d/60-stillmap.rules",
-                    "/usr/lib/sysusers.d/stillmap.conf", "/usr/share/stillmap/presets/default.toml",
+                    "/usr/lib/sysusers.d/stillmap.conf", "/usr/share/stillmap/presets/default.toml", "/usr/share/stillmap/calibrations/xtion.toml",
                     "/usr/share/stillmap/lcm/pose_t.lcm", "/usr/share/doc/stillmap/DEPLOY.md",
                     "/usr/share/doc/stillmap/copyright", *SETTINGS]
         for path in expected:

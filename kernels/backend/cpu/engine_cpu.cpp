@@ -285,7 +285,9 @@ PrepareResult CpuEngine::prepare(const FrameView& frame) {
                          memory_.source_pixel,
                          1.0f / params_.depth_units_per_m,
                          params_.depth.min_m,
-                         params_.depth.max_m};
+                         params_.depth.max_m,
+                         params_.depth_bias,
+                         !params_.depth_bias.none()};
   const uint32_t tiles = tiles_of(k().height, kRowsPerTile);
   pool_.for_each(tiles, [&](uint32_t tile) {
     const int32_t first = static_cast<int32_t>(tile) * kRowsPerTile;

@@ -12,6 +12,17 @@ namespace stillmap {
 namespace {
 
 /// A row of a picture without distortion: every pixel stays where it is.
+/// Metres once more, with the bias taken out. @return valid pixels
+int32_t unbias_row(const PreparePass& pass, const uint16_t* raw, float* depth_m) {
+  int32_t valid = 0;
+  for (int32_t c = 0; c < pass.depth_m.cols; ++c) {
+    const float z_m = metres_from_raw(raw[c], pass.m_per_unit, pass.min_m, pass.bias, pass.max_m);
+    depth_m[c] = z_m;
+    valid += static_cast<int32_t>(z_m > 0.0f) & static_cast<int32_t>(z_m <= pass.max_m);
+  }
+  return valid;
+}
+
 int32_t prepare_row(const PreparePass& pass, int32_t row) {
   const int32_t cols = pass.depth_m.cols, whole = cols / kLanes * kLanes;
   const uint16_t* raw = pass.depth_raw.row(row);
@@ -24,6 +35,7 @@ int32_t prepare_row(const PreparePass& pass, int32_t row) {
     depth_m[c] = z_m;
     valid += static_cast<int32_t>(z_m > 0.0f) & static_cast<int32_t>(z_m <= pass.max_m);
   }
+  if (pass.biased) valid = unbias_row(pass, raw, depth_m);
   std::copy_n(rgb, cols, pass.colour.row(row));
   for (int32_t c = 0; c < whole; c += kLanes) {
     Int8 r, g, b;

@@ -98,7 +98,9 @@ PrepareResult DeviceEngine<Device>::prepare(const FrameView& frame) {
                 d_.source_pixel,
                 1.0f / params_.depth_units_per_m,
                 params_.depth.min_m,
-                params_.depth.max_m};
+                params_.depth.max_m,
+                params_.depth_bias,
+                !params_.depth_bias.none()};
   state.cell_depth = {d_.depth_m, d_.luma_chroma, d_.cells.grid, params_.depth.max_m};
   state.cell_normal = {d_.cells.grid};
   state.valid = 0;

@@ -177,33 +177,6 @@ TEST(ApplySetting, RefusesAndLeavesTheConfigurationAlone) {
   EXPECT_TRUE(contains(unknown.error(), "did you mean record.masks?")) << unknown.error();
 }
 
-TEST(CameraFile, ReadsWhatItKnowsAndLetsOthersBe) {
-  const test::TempDir dir;
-  test::write_text(dir / "camera.toml",
-                   "fx = 500\nfy = 501.5\ncx = 320.0\ncy = 240.0\ndistortion = [0.1, -0.2, 0, 0.001, 0.3]\n"
-                   "depth_scale = 1000\nname = \"mine\"\nwidth = 640\n");
-  const Result<CameraFile> camera = load_camera_file(dir / "camera.toml");
-  ASSERT_TRUE(camera) << camera.error();
-  ASSERT_TRUE(camera->fx_fy_cx_cy);
-  EXPECT_EQ(*camera->fx_fy_cx_cy, (std::array<double, 4>{500, 501.5, 320, 240}));
-  EXPECT_EQ(camera->distortion, (std::array<double, 5>{0.1, -0.2, 0, 0.001, 0.3}));
-  EXPECT_EQ(camera->depth_scale, 1000);
-}
-
-TEST(CameraFile, RefusesWhatWouldSilentlyBeAnotherCamera) {
-  const test::TempDir dir;
-  for (const char* text :
-       {"fx = 500\n", "fx = nan\nfy = 1\ncx = 1\ncy = 1", "fx = \"5\"", "distortion = [1, 2]",
-        "distortion = 3", "distortion = [1, 2, 3, \"4\"]", "distorsion = [0, 0, 0, 0]", "k1 = 0.1",
-        "depth_scale = 0", "depth_scale = -1", "depthscale = 1000", "depth_scale = nan",
-        "fx = true\nfy = 1\ncx = 1\ncy = 1", "fx ="}) {
-    test::write_text(dir / "camera.toml", text);
-    const Result<CameraFile> camera = load_camera_file(dir / "camera.toml");
-    ASSERT_FALSE(camera) << text;
-    EXPECT_TRUE(contains(camera.error(), "camera.toml")) << camera.error();
-  }
-}
-
 /// Outside bytes: whatever they are, there is a configuration or an error, never a crash.
 TEST(Load, MutatedFilesNeverCrash) {
   constexpr uint32_t kSeed = 20240611;

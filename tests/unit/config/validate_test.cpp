@@ -77,6 +77,49 @@ TEST(Validate, TheMountIsAPose) {
                        "mount.T_body_cam: the length of the quaternion"));
 }
 
+void good_sonar(Config& c) {
+  c.sonar.kind = SonarKind::hc_sr04;
+  c.sonar.trigger_line = 5;
+  c.sonar.echo_line = 6;
+}
+
+/// The violations of a good sonar after one change.
+template <class Change>
+std::vector<std::string> sonar_after(Change change) {
+  return after([&](Config& c) {
+    good_sonar(c);
+    change(c.sonar);
+  });
+}
+
+TEST(Validate, TheSonarFitsTogether) {
+  EXPECT_TRUE(after(good_sonar).empty());
+  EXPECT_TRUE(sonar_after([](SonarConfig& s) { s.stop_line = 7; }).empty());
+  EXPECT_TRUE(sonar_after([](SonarConfig& s) {
+                s.kind = SonarKind::pulse_width;
+                s.trigger_line = -1;
+                s.max_m = 7;
+              }).empty());
+  const auto only = [](const std::vector<std::string>& found, const std::string& text) {
+    EXPECT_EQ(found.size(), 1u) << text;
+    EXPECT_TRUE(mentions(found, text)) << (found.empty() ? "nothing" : found.front());
+  };
+  only(sonar_after([](SonarConfig& s) { s.chip.clear(); }), "sonar.chip");
+  only(sonar_after([](SonarConfig& s) { s.echo_line = -1; }), "sonar.echo_line = -1");
+  only(sonar_after([](SonarConfig& s) { s.trigger_line = -1; }), "needs a trigger line");
+  only(sonar_after([](SonarConfig& s) { s.kind = SonarKind::pulse_width; }), "no effect with sonar.kind");
+  only(sonar_after([](SonarConfig& s) { s.trigger_line = s.echo_line; }), "is sonar.trigger_line as well");
+  only(sonar_after([](SonarConfig& s) { s.stop_line = s.echo_line; }), "is sonar.echo_line as well");
+  only(sonar_after([](SonarConfig& s) { s.min_m = s.max_m; }), "must be below sonar.max_m = 4.0");
+  only(sonar_after([](SonarConfig& s) { s.stop_m = 5; }), "sonar.stop_m = 5.0");
+  only(sonar_after([](SonarConfig& s) { s.stop_line = 7, s.stop_m = 0.01f; }), "never says stop");
+  only(sonar_after([](SonarConfig& s) { s.max_m = 12; }), "allowed below 12.5");
+  only(sonar_after([](SonarConfig& s) { s.rate_hz = 1, s.lost_s = 1, s.max_age_s = 1; }), "sonar.lost_s = 1.0");
+  only(sonar_after([](SonarConfig& s) { s.rate_hz = 1.5f; }), "sonar.max_age_s = 0.25");
+  only(sonar_after([](SonarConfig& s) { s.T_cam_sonar[6] = 2; }), "sonar.T_cam_sonar");
+  only(after([](Config& c) { c.sonar.stop_line = 7; }), "no effect while sonar.kind is none");
+}
+
 TEST(Validate, EndsOfARangeAreAllowed) {
   EXPECT_TRUE(after([](Config& c) { c.depth.min_m = 0.01f; }).empty());
   EXPECT_TRUE(after([](Config& c) { c.map.high_water = 0.1f; }).empty());

@@ -133,6 +133,28 @@ void expect_same_maps_of_frames(EngineParams params, LaneOrder order) {
     }
   }
 }
+TEST_P(OnGrid, TheBiasOfTheDepthIsTakenOutAlike) {
+  for (const float k1 : {0.0f, 0.1f}) {
+    EngineParams params = small_params();
+    params.camera.distortion.k1 = k1;
+    EnginePair plain(params, GetParam());
+    params.depth_bias = {{0.02f, 0.99f, 0.003f, -0.0004f}};
+    EnginePair biased(params, GetParam());
+    plain.prepare(0);
+    biased.prepare(0);
+    const auto a = biased.cpu->depth_image_m(), b = biased.gpu().depth_image_m(), raw = plain.cpu->depth_image_m();
+    int32_t valid = 0;
+    for (int32_t r = 0; r < a.rows; ++r)
+      for (int32_t c = 0; c < a.cols; ++c) {
+        ASSERT_EQ(a.at(r, c), b.at(r, c)) << r << " " << c;
+        if (raw.at(r, c) == 0) continue;
+        ++valid;
+        ASSERT_FLOAT_EQ(a.at(r, c), params.depth_bias.corrected(raw.at(r, c), params.depth.max_m));
+      }
+    EXPECT_GT(valid, 1000);
+  }
+}
+
 TEST_P(OnGrid, HierarchicalMapIsTheSameToTheBit) {
   expect_same_maps_of_frames(small_params(), GetParam());
 }

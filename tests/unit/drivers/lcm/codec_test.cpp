@@ -105,6 +105,7 @@ stillmap::decision_t lcm_decision(const DecisionMessage& m) {
     t.odometry_stamp_ns[i] = m.odometry[i].sample.stamp.ns;
     copy_transform(m.odometry[i].sample.T_odom_body, t.T_odom_body[i]);
   }
+  t.sonar_m = m.sonar_m;
   return t;
 }
 
@@ -116,6 +117,7 @@ stillmap::session_t lcm_session(const SessionMessage& m) {
   std::copy_n(m.distortion, 5, t.distortion);
   copy_transform(m.T_map_cam, t.T_map_cam);
   t.map = m.map;
+  std::copy_n(m.depth_bias, 4, t.depth_bias);
   return t;
 }
 
@@ -165,6 +167,36 @@ TEST(LcmCodec, WritesDecisionsAsLcmGenDoes) {
 
 TEST(LcmCodec, WritesSessionsAsLcmGenDoes) {
   EXPECT_EQ(encoded(samples::session()), generated(lcm_session(samples::session())));
+}
+
+/// As a program before this one wrote it: another fingerprint, and the last member is missing.
+Bytes as_older(Bytes bytes, uint64_t fingerprint, size_t last_member_bytes) {
+  for (size_t i = 0; i < 8; ++i) bytes[i] = static_cast<uint8_t>(fingerprint >> (56 - 8 * i));
+  bytes.resize(bytes.size() - last_member_bytes);
+  return bytes;
+}
+
+TEST(LcmCodec, ReadsDecisionsAndSessionsOfOlderLogs) {
+  const Bytes decision = as_older(encoded(samples::decision()), 0x58644e1b0cab23bd, 4);
+  DecisionMessage read;
+  read.sonar_m = 9;
+  ASSERT_EQ(decode(decision, read), Status::ok);
+  EXPECT_EQ(read.sonar_m, 0.0f);
+  EXPECT_EQ(read.sequence, samples::decision().sequence);
+  EXPECT_EQ(decode(as_older(decision, 0x58644e1b0cab23bd, 1), read), Status::bad_data);
+  SessionMessage session;
+  const Bytes bytes = as_older(encoded(samples::session()), 0x534fa6b20e22fff9, 32);
+  ASSERT_EQ(decode(bytes, session), Status::ok);
+  EXPECT_EQ(session.map, samples::session().map);
+  EXPECT_EQ(session.depth_bias[1], 1.0) << "none";
+}
+
+TEST(LcmCodec, RefusesADistanceThatIsNone) {
+  DecisionMessage message = samples::decision(), read;
+  for (const float sonar_m : {-1.0f, 1e9f, std::numeric_limits<float>::quiet_NaN()}) {
+    message.sonar_m = sonar_m;
+    EXPECT_EQ(decode(encoded(message), read), Status::bad_data) << sonar_m;
+  }
 }
 
 TEST(LcmCodec, WritesEventsAsLcmGenDoes) {

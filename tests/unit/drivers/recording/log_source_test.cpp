@@ -87,6 +87,23 @@ TEST(LogSource, GivesTheUsedFramesAndWhatTheSessionSays) {
   EXPECT_EQ(source->next(memory.frame, 0), Status::end) << "and stays there";
 }
 
+TEST(LogSource, AFrameComesWithWhatTheSonarSaid) {
+  const test::TempDir dir;
+  {
+    LoggedRun run(dir.path());
+    DecisionMessage decision = test::decision_about(0);
+    decision.sonar_m = 0.31f;
+    ASSERT_EQ(run.add(decision), Status::ok);
+    ASSERT_EQ(run.add(1), Status::ok);
+  }
+  auto source = open(dir.path());
+  FrameMemory memory(source->info());
+  ASSERT_EQ(source->next(memory.frame, 0), Status::ok);
+  EXPECT_EQ(memory.frame.sonar_m, 0.31f);
+  ASSERT_EQ(source->next(memory.frame, 0), Status::ok);
+  EXPECT_EQ(memory.frame.sonar_m, 0.0f);
+}
+
 TEST(LogSource, TheCameraThatIsGivenWins) {
   const test::TempDir dir;
   ASSERT_EQ(LoggedRun(dir.path()).add(0), Status::ok);

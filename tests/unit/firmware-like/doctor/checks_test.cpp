@@ -21,6 +21,9 @@ class Doctor : public testing::Test {
     machine.locked_limit_bytes = [this] { return locked_limit; };
     machine.clock_synchronised = [this] { return clock_synchronised; };
     machine.free_bytes = [this](const std::string&) { return free_bytes; };
+    machine.gpio_problem = [this](const std::string&, int32_t line) {
+      return line == taken_line ? "line is in use" : "";
+    };
     intent.source = "xtion";
     intent.planned_bytes = 400 * kMegabyte;
 
@@ -81,6 +84,7 @@ class Doctor : public testing::Test {
   Machine machine;
   RunIntent intent;
   std::string forbidden;
+  int32_t taken_line = -1;
   uint64_t priority_limit = 95, locked_limit = Machine::kUnlimited;
   bool clock_synchronised = true;
   std::optional<uint64_t> free_bytes = 100'000 * kMegabyte;
@@ -99,6 +103,21 @@ TEST_F(Doctor, FindsNothingWhereNothingIsWrong) {
     EXPECT_EQ(finding.verdict, Verdict::ok) << finding.part << finding.text;
   EXPECT_GE(found.size(), 13u);
   EXPECT_EQ(to_text(found).find("mend:"), std::string::npos);
+}
+
+TEST_F(Doctor, TheSonarsLines) {
+  intent.config.sonar.kind = SonarKind::hc_sr04;
+  intent.config.sonar.trigger_line = 5;
+  intent.config.sonar.echo_line = 6;
+  expect_only(Verdict::worse, "sonar", "/dev/gpiochip0 is not there", "gpiodetect");
+  write("/dev/gpiochip0", "");
+  EXPECT_NE(to_text(all()).find("its lines are free"), std::string::npos);
+  taken_line = 6;
+  expect_only(Verdict::worse, "sonar", "line is in use", "gpioinfo");
+  forbidden = machine.root + "/dev/gpiochip0";
+  expect_only(Verdict::worse, "sonar", "cannot be opened by this user", "usermod -aG gpio");
+  machine.gpio_problem = nullptr;
+  expect_only(Verdict::wrong, "sonar", "no libgpiod", "libgpiod-dev");
 }
 
 TEST_F(Doctor, CameraThatIsNotThere) {

@@ -22,6 +22,22 @@ TEST(MetresFromRaw, NoMeasurementAndTooNearAreZero) {
   EXPECT_FLOAT_EQ(metres_from_raw(65534, 0.001f, 0.1f), 65.534f);  // far ones stay: they show free space
 }
 
+TEST(DepthBias, IsTakenOutBeforeTheRangeIsLookedAt) {
+  const DepthBias bias{{0.01f, 1.02f, -0.004f, 0.001f}};
+  EXPECT_FALSE(bias.none());
+  EXPECT_TRUE(DepthBias{}.none());
+  const auto polynomial = [](float m) { return 0.01f + 1.02f * m - 0.004f * m * m + 0.001f * m * m * m; };
+  for (const uint16_t raw : {500, 1000, 2500, 4000})
+    EXPECT_FLOAT_EQ(metres_from_raw(raw, 0.001f, 0.1f, bias, 4.0f), polynomial(0.001f * raw));
+  EXPECT_EQ(metres_from_raw(0, 0.001f, 0.1f, bias, 4.0f), 0.0f) << "not the offset";
+  EXPECT_EQ(metres_from_raw(65535, 0.001f, 0.1f, bias, 4.0f), 0.0f);
+  EXPECT_EQ(metres_from_raw(80, 0.001f, 0.1f, bias, 4.0f), 0.0f) << "0.09 m";
+  EXPECT_GT(metres_from_raw(95, 0.001f, 0.1f, bias, 4.0f), 0.1f);
+  // Beyond what it was fitted to the difference stays what it is there.
+  EXPECT_FLOAT_EQ(metres_from_raw(60000, 0.001f, 0.1f, bias, 4.0f), 60.0f + polynomial(4.0f) - 4.0f);
+  EXPECT_EQ(metres_from_raw(1000, 0.001f, 0.1f, DepthBias{{NAN, 1, 0, 0}}, 4.0f), 0.0f);
+}
+
 TEST(Bilinear, BlendsNeighboursAndIsBlackOutside) {
   TestImage<Rgb8> image(2, 3);
   image.view().at(0, 0) = {0, 100, 10};
@@ -105,6 +121,37 @@ TEST(Prepare, WritesMetresLumaAndCountsWhatIsInRange) {
       }
   }
   EXPECT_EQ(kLoopsBaseline.prepare(images.pass(false), 1, 2), 10);  // rows [first, last)
+}
+
+TEST(Prepare, TakesTheBiasOutWithAndWithoutALens) {
+  constexpr int32_t kCols = 20;
+  Prepared images(2, kCols);
+  for (int32_t r = 0; r < 2; ++r)
+    for (int32_t c = 0; c < kCols; ++c) {
+      images.depth_raw.view().at(r, c) = static_cast<uint16_t>(c == 3 ? 0 : 4700 + 50 * c);
+      images.source.view().at(r, c) = {static_cast<float>(c), static_cast<float>(r)};
+    }
+  for (const CpuLoops* loops : runnable_loops())
+    for (const bool undistort : {false, true}) {
+      PreparePass pass = images.pass(undistort);
+      pass.bias = {{-0.02f, 1.01f, 0, 0}};
+      pass.biased = true;
+      // 4.7 m and more; 5 m are reached from 0.98 + ... = 4970.3 units on: columns 0 to 5 but one.
+      EXPECT_EQ(loops->prepare(pass, 0, 2), 2 * 5) << loops->name;
+      for (int32_t r = 0; r < 2; ++r)
+        for (int32_t c = 0; c < kCols; ++c) {
+          const uint16_t raw = images.depth_raw.view().at(r, c);
+          EXPECT_FLOAT_EQ(images.depth_m.view().at(r, c),
+                          raw == 0 ? 0.0f : metres_from_raw(raw, 0.001f, 0.1f, pass.bias, 5.0f));
+        }
+      EXPECT_NEAR(images.depth_m.view().at(0, 0), 4.727f, 1e-5f);
+      // One that is nothing changes nothing, to the last bit.
+      pass.bias = {};
+      loops->prepare(pass, 0, 2);
+      for (int32_t c = 0; c < kCols; ++c)
+        EXPECT_EQ(images.depth_m.view().at(1, c),
+                  metres_from_raw(images.depth_raw.view().at(1, c), 0.001f, 0.1f));
+    }
 }
 
 // A checker of two depths seen through a strong lens: whatever comes out is one of the two, and the nearest.

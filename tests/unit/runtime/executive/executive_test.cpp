@@ -85,6 +85,7 @@ class Notebook final : public RunRecorder {
     if (item.has_frame) items.push_back(item);
     with_images += frame != nullptr;
   }
+  void add(const RangeReading& reading) override { ranges.push_back(reading); }
   void add(const Notice& notice) override {
     notices.emplace_back(std::string(notice.name) + ": " + notice.text);
   }
@@ -98,6 +99,7 @@ class Notebook final : public RunRecorder {
   }
 
   std::vector<RunItem> items;
+  std::vector<RangeReading> ranges;
   std::vector<std::string> notices;
   int with_images = 0;
   std::chrono::milliseconds slow{0};
@@ -117,7 +119,10 @@ class Ear final : public MessageBus, public MessageCodec {
     last = message;
     return 1;
   }
-  uint32_t encode(const RangeMessage&, View<uint8_t>) const override { return 0; }
+  uint32_t encode(const RangeMessage& message, View<uint8_t>) const override {
+    if (range_count < kMost) ranges[range_count++] = {message, monotonic_ns()};
+    return 1;
+  }
   uint32_t encode(const CommandMessage&, View<uint8_t>) const override { return 0; }
   uint32_t encode(const FrameMessage&, View<uint8_t>) const override { return 0; }
   uint32_t encode(const DecisionMessage&, View<uint8_t>) const override { return 0; }
@@ -146,8 +151,69 @@ class Ear final : public MessageBus, public MessageCodec {
   static constexpr size_t kMost = 1000;
   mutable std::array<Sent, kMost> poses{};
   mutable size_t count = 0;
+  struct SentRange {
+    RangeMessage message;
+    int64_t sent_ns = 0;
+  };
+  mutable std::array<SentRange, kMost> ranges{};
+  mutable size_t range_count = 0;
   mutable StatusMessage last;
   bool down = false;
+};
+
+/// A sonar whose line the test drives: an echo of `range_m` to every trigger.
+class FakeSonar final : public RangeSensor {
+ public:
+  Status open() override {
+    ++opened;
+    if (monotonic_ns() < gone_until_ns) return Status::unavailable;
+    pending_ = 0;
+    return set_stop(true);
+  }
+  Status trigger(Stamp& at) override {
+    if (monotonic_ns() < gone_until_ns) return Status::unavailable;
+    at.ns = monotonic_ns();
+    ++triggers;
+    const float range_m = echoes_m[std::min(triggers - 1, static_cast<uint32_t>(echoes_m.size()) - 1)];
+    if (range_m == kGone) {
+      gone_until_ns = at.ns + gone_ns;
+      return Status::unavailable;
+    }
+    if (range_m == kNoAnswer) return Status::ok;
+    const auto pulse_ns = static_cast<int64_t>(2e9f * range_m / speed_of_sound(20));
+    edges_[0] = {{at.ns + 300'000}, true};
+    edges_[1] = {{at.ns + 300'000 + pulse_ns}, false};
+    pending_ = 2;
+    return Status::ok;
+  }
+  Status next_edge(EchoEdge& edge, int32_t timeout_ms) override {
+    if (pending_ == 0) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(timeout_ms));
+      return Status::timeout;
+    }
+    edge = edges_[2 - pending_--];
+    while (monotonic_ns() < edge.stamp.ns) std::this_thread::sleep_for(std::chrono::microseconds(100));
+    return Status::ok;
+  }
+  Status set_stop(bool high) override {
+    stop_line = high;
+    ++(high ? to_stop : to_go);
+    if (high) stopped_ns = monotonic_ns();
+    return Status::ok;
+  }
+  const std::string& error() const override { return error_; }
+
+  static constexpr float kNoAnswer = 0, kGone = -1;
+  std::vector<float> echoes_m = {1.0f};  ///< to one trigger after the other; the last goes on
+  int64_t gone_ns = 0, gone_until_ns = 0;
+  uint32_t triggers = 0, opened = 0, to_stop = 0, to_go = 0;
+  bool stop_line = false;
+  int64_t stopped_ns = 0;
+
+ private:
+  EchoEdge edges_[2];
+  uint32_t pending_ = 0;
+  const std::string error_ = "the chip was pulled out";
 };
 
 class Orders final : public CommandPort {
@@ -188,6 +254,7 @@ class Executives : public testing::Test {
     parts.codec = &ear;
     parts.bus = &ear;
     parts.commands = &orders;
+    parts.sonar = sonar;
     parts.stop_requested = [this] { return stop.load(); };
     parts.on_status = [this](const StatusMessage& status) { modes.push_back(status.mode); };
     Executive executive(parts, config, {{}, max_frames, live, keep_images});
@@ -205,6 +272,7 @@ class Executives : public testing::Test {
   RunState state;
   UtcClock clock;
   std::vector<Mode> modes;
+  RangeSensor* sonar = nullptr;
   std::atomic<bool> stop{false};
   bool keep_images = false, slow_camera = false;
   test::EngineDelays delays;
@@ -376,6 +444,118 @@ TEST_F(Executives, CommandsThatCannotBeObeyedAreRefused) {
   run("crowd,size=80x60,seconds=1", true);
   EXPECT_EQ(ear.last.command_id, 6u);
   EXPECT_EQ(ear.last.command_result, CommandResult::refused);
+}
+
+class WithASonar : public Executives {
+ protected:
+  void SetUp() override {
+    Executives::SetUp();
+    config.sonar.kind = SonarKind::hc_sr04;
+    config.sonar.rate_hz = 20;
+    config.sonar.lost_s = 0.3f;
+    config.sonar.stuck_s = 0.3f;
+    sonar = &fake;
+  }
+  bool held(Fault fault) const { return state.faults.entry(fault).count > 0; }
+  bool holds(Fault fault) const { return (state.faults.active() >> static_cast<uint32_t>(fault) & 1) != 0; }
+
+  FakeSonar fake;
+};
+
+TEST_F(WithASonar, AReadingReachesTheFrameTheNetworkAndTheLog) {
+  run("crowd,size=80x60,seconds=2", true);
+  EXPECT_GE(ear.range_count, 20u);
+  EXPECT_GE(notebook.ranges.size(), ear.range_count - 1);
+  EXPECT_NEAR(ear.ranges[5].message.range_m, 1.0, 1e-3);
+  EXPECT_TRUE(ear.ranges[5].message.valid);
+  EXPECT_FALSE(ear.ranges[5].message.stop);
+  EXPECT_EQ(ear.ranges[5].message.max_range_m, config.sonar.max_m);
+  EXPECT_NEAR(static_cast<double>(ear.ranges[5].message.utime.us),
+              static_cast<double>(clock.to_utc_us(notebook.ranges[5].stamp.ns)), 1000);
+  // What a frame was told is in its decision: none before the first reading, then that of its time.
+  const auto told = std::count_if(notebook.items.begin(), notebook.items.end(), [](const RunItem& item) {
+    return std::abs(item.decision.sonar_m - 1.0f) < 1e-3f;
+  });
+  EXPECT_GE(static_cast<size_t>(told) + 10, notebook.items.size());
+  EXPECT_FALSE(held(Fault::range_lost));
+  EXPECT_FALSE(held(Fault::range_stuck));
+  EXPECT_TRUE(fake.stop_line) << "where the program ends, the line says stop";
+  EXPECT_EQ(fake.to_go, 1u);
+}
+
+TEST_F(WithASonar, WithoutASonarAFrameIsToldNothing) {
+  sonar = nullptr;
+  run("crowd,size=80x60,seconds=1", true);
+  for (const RunItem& item : notebook.items) EXPECT_EQ(item.decision.sonar_m, 0.0f);
+  EXPECT_EQ(ear.range_count, 0u);
+}
+
+// Far, then suddenly near: the line and the message do not wait for the median, nor for a frame.
+TEST_F(WithASonar, WhatIsTooNearStopsAtOnce) {
+  fake.echoes_m = std::vector<float>(15, 2.0f);
+  fake.echoes_m.push_back(0.2f);
+  run("crowd,size=80x60,seconds=2", true);
+  const auto* first = std::find_if(ear.ranges.begin(), ear.ranges.begin() + ear.range_count,
+                                   [](const Ear::SentRange& sent) { return sent.message.stop; });
+  ASSERT_EQ(first - ear.ranges.begin(), 15);
+  EXPECT_EQ(fake.to_go, 1u);
+  EXPECT_EQ(fake.to_stop, 2u) << "when it was opened, and then; it is high when the program ends";
+  const int64_t sound_ns = clock.to_monotonic_ns(first->message.utime.us);
+  EXPECT_LT(static_cast<double>(fake.stopped_ns - sound_ns) * 1e-6, 50.0);
+  if (!heap_guard::counts()) return;  // a sanitizer takes its time
+  EXPECT_LT(static_cast<double>(first->sent_ns - sound_ns) * 1e-6, 50.0);
+}
+
+TEST_F(WithASonar, NoEchoIsLostAndAnEchoBringsItBack) {
+  fake.echoes_m = std::vector<float>(10, 1.0f);
+  fake.echoes_m.insert(fake.echoes_m.end(), 12, 6.0f);  // beyond sonar.max_m
+  fake.echoes_m.push_back(1.0f);
+  run("crowd,size=80x60,seconds=2", true);
+  EXPECT_EQ(state.faults.entry(Fault::range_lost).count, 1u);
+  EXPECT_FALSE(holds(Fault::range_lost));
+  EXPECT_FALSE(held(Fault::range_stuck));
+  EXPECT_TRUE(notebook.heard("range_lost"));
+  EXPECT_EQ(std::count(modes.begin(), modes.end(), Mode::degraded) > 0, true);
+  EXPECT_EQ(fake.to_go, 2u) << "while it is lost the line says stop";
+}
+
+TEST_F(WithASonar, ALineThatDoesNotMoveIsStuck) {
+  fake.echoes_m = {1.0f, 1.0f, 1.0f, FakeSonar::kNoAnswer};
+  run("crowd,size=80x60,seconds=2", true);
+  EXPECT_TRUE(holds(Fault::range_stuck));
+  EXPECT_TRUE(holds(Fault::range_lost));
+  EXPECT_TRUE(fake.stop_line);
+  EXPECT_EQ(notebook.items.size() + state.frames_dropped, 60u) << "frames go on";
+}
+
+TEST_F(WithASonar, AChipThatIsPulledOutComesBack) {
+  fake.echoes_m = {1.0f, 1.0f, FakeSonar::kGone, 1.0f};
+  fake.gone_ns = 300'000'000;
+  run("crowd,size=80x60,seconds=2", true);
+  EXPECT_EQ(fake.opened, 3u) << "at boot, at once, and half a second later";
+  EXPECT_EQ(state.faults.entry(Fault::range_lost).count, 1u);
+  EXPECT_FALSE(holds(Fault::range_lost));
+  EXPECT_EQ(std::count_if(notebook.notices.begin(), notebook.notices.end(),
+                          [](const std::string& n) { return n == "range_lost: the chip was pulled out"; }),
+            1);
+  EXPECT_GT(fake.triggers, 10u);
+}
+
+TEST_F(WithASonar, OneThatIsNeverThereEndsNothing) {
+  fake.gone_until_ns = std::numeric_limits<int64_t>::max();
+  run("crowd,size=80x60,seconds=1", true);
+  EXPECT_TRUE(holds(Fault::range_lost));
+  EXPECT_LE(fake.opened, 3u) << "it is looked for less and less often";
+  EXPECT_EQ(notebook.items.size() + state.frames_dropped, 30u);
+}
+
+// The real-time, publish and sonar threads leave the heap alone.
+TEST_F(WithASonar, NothingOfItAllocates) {
+  if (!heap_guard::counts()) GTEST_SKIP() << "the sanitizer's heap is not counted";
+  fake.echoes_m = {1.0f, 0.2f, 6.0f, 1.0f, FakeSonar::kNoAnswer, 1.0f};
+  const uint64_t before = heap_guard::allocations();
+  run("crowd,size=80x60,seconds=1", true);
+  EXPECT_EQ(heap_guard::allocations(), before);
 }
 
 }  // namespace
