@@ -31,6 +31,8 @@ void FrameLoop::run() {
     else if (ended)
       break;
   }
+  const heap_guard::Scope armed;
+  p_.pipeline.finish();
 }
 
 void FrameLoop::work_on(uint32_t slot) {
@@ -38,7 +40,8 @@ void FrameLoop::work_on(uint32_t slot) {
   FrameResult result;
   {
     const heap_guard::Scope armed;
-    const FrameWork work = limits_.live ? FrameWork{load_.integrate(), load_.finest_level()} : FrameWork{};
+    FrameWork work = limits_.live ? FrameWork{load_.integrate(), load_.finest_level()} : FrameWork{};
+    if (frame.sonar_m > 0) work.sonar_m = frame.sonar_m;
     decide(frame, work);
     if (p_.odometry) p_.odometry->begin_frame();
     result = p_.pipeline.process(frame, work, this);

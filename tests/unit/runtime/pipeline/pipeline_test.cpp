@@ -38,6 +38,23 @@ class ScriptedEngine : public Engine {
     integrate_pose = T;
     return {};
   }
+  uint32_t keep_frame(const Se3& T, const NearEcho& echo) override {
+    calls += 'k';
+    kept.push_back(T);
+    echoes.push_back(echo);
+    return kept_frames();
+  }
+  IntegrateResult integrate_kept(uint32_t index) override {
+    calls += 'o';
+    integrate_pose = kept.at(index);
+    mapped_x.push_back(integrate_pose.translation.x);
+    return {};
+  }
+  void forget_kept(uint32_t oldest) override {
+    kept.erase(kept.begin(), kept.begin() + oldest);
+    echoes.erase(echoes.begin(), echoes.begin() + oldest);
+  }
+  uint32_t kept_frames() const override { return static_cast<uint32_t>(kept.size()); }
   void remember_place(const Se3&) override { ++keyframes; }
   PlaceResult find_place(const Se3& T_guess, int32_t) override {
     calls += 'f';
@@ -72,7 +89,11 @@ class ScriptedEngine : public Engine {
     health.blocks = 77;
     return health;
   }
-  void reset_map() override { ++resets; }
+  void reset_map() override {
+    ++resets;
+    kept.clear();
+    echoes.clear();
+  }
 
   std::string calls;  ///< first letters, in order
   Status prepare_status = Status::ok;
@@ -83,6 +104,9 @@ class ScriptedEngine : public Engine {
   Se3 find_guess;
   float period_s = -1;  ///< told with the last frame
   Se3 track_start, mask_pose, refine_start, integrate_pose;
+  std::vector<Se3> kept;  ///< what waits to be completed
+  std::vector<NearEcho> echoes;
+  std::vector<float> mapped_x;  ///< of the poses of what was completed
 };
 
 Se3 at(float x, float y = 0) {
