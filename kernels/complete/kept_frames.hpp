@@ -43,6 +43,7 @@ class KeptFrames {
     model_.cell_cols = (cols + model_.cell_px - 1) / model_.cell_px;
     model_.start = arena.take<uint32_t>(name, (capacity_ - 1) * static_cast<uint64_t>(model_.cell_rows) *
                                                   static_cast<uint64_t>(model_.cell_cols));
+    silent_ = arena.take_image<uint8_t>(name, model_.cell_rows, model_.cell_cols);
     far_m_ = p.depth.far_m;
   }
 
@@ -78,12 +79,16 @@ class KeptFrames {
       const Se3 T_own_other = T_own_map * other.T_map_cam;
       frames[model.frames++] = {other.depth_m, other.mask, inverse(T_own_other), T_own_other};
     }
-    return {model, own.depth_m, own.mask, completed_m_, own.echo, far_m_};
+    return {model, own.depth_m, own.mask, completed_m_, silent_, own.echo, far_m_};
+  }
+  SilentCellPass silent_cells_of(const CompletePass& pass) const {
+    return {pass.model, pass.depth_m, silent_, pass.echo};
   }
 
  private:
   KeptFrame slot_[kMostModelFrames + 1];
   ImageView<float> completed_m_;
+  ImageView<uint8_t> silent_;
   TemporaryModel model_;  ///< without frames
   float far_m_ = 0;
   uint32_t capacity_ = 0, first_ = 0, count_ = 0;

@@ -50,6 +50,15 @@ struct TemporaryModel {
   STILLMAP_HD uint32_t& start_at(int32_t i, int32_t row, int32_t col) const {
     return start[static_cast<uint32_t>((i * cell_rows + row) * cell_cols + col)];
   }
+  /// The pixel that stands for a cell.
+  STILLMAP_HD int32_t middle_row(int32_t cell) const {
+    const int32_t at = cell * cell_px + cell_px / 2;
+    return at < k.height ? at : k.height - 1;
+  }
+  STILLMAP_HD int32_t middle_col(int32_t cell) const {
+    const int32_t at = cell * cell_px + cell_px / 2;
+    return at < k.width ? at : k.width - 1;
+  }
 };
 
 /// Of positive numbers the order is that of their bits.
@@ -64,6 +73,10 @@ STILLMAP_HD float depth_of_bits(uint32_t bits) {
   return z_m;
 }
 
+/// A gap between the measurements of a row that is at most so wide, a tenth of the picture, says nothing of
+/// what lies far away.
+constexpr int32_t kNarrowCells = 16;
+
 /// Puts the pixel in the middle of one cell of one frame where it lies in the target's picture.
 ///                                                                              test: temporary_model_test
 struct StartDepthPass {
@@ -71,7 +84,7 @@ struct StartDepthPass {
 
   STILLMAP_HD void operator()(int32_t i, int32_t cell_row, int32_t cell_col) const {
     const ModelFrame& from = model.frame[i];
-    const int32_t row = middle(cell_row, from.depth_m.rows), col = middle(cell_col, from.depth_m.cols);
+    const int32_t row = model.middle_row(cell_row), col = model.middle_col(cell_col);
     const float z_m = from.depth_m.at(row, col);
     if (!(z_m > 0.0f) || from.mask.at(row, col) != 0) return;
     const Vec3 p =
@@ -85,11 +98,52 @@ struct StartDepthPass {
                   r = static_cast<int32_t>(at.v + 0.5f) / model.cell_px;
     atomic_least(&model.start_at(i, r, c), bits_of_depth(p.z));
   }
+};
+
+/// Whether nothing follows from a cell of the target that was not measured. In a narrow gap between the
+/// measurements of its row it lies in the shadow of the projector beside what is near, or was missed. And
+/// where the gap reaches, along the row or the column, to what the sonar has heard, that thing or its shadow
+/// may fill it.
+///                                                                              test: temporary_model_test
+struct SilentCellPass {
+  TemporaryModel model;
+  ImageView<const float> depth_m;  ///< of the target, 0: invalid
+  ImageView<uint8_t> silent;       ///< of each cell: 1 or 0
+  NearEcho echo;                   ///< of the target
+
+  STILLMAP_HD void operator()(int32_t row, int32_t col) const {
+    const bool narrow = gap_to(row, col, 1) + gap_to(row, col, -1) <= kNarrowCells;
+    silent.at(row, col) = narrow || (echo.range_m > 0.0f && reaches_echo(row, col)) ? 1 : 0;
+  }
 
  private:
-  STILLMAP_HD int32_t middle(int32_t cell, int32_t length) const {
-    const int32_t at = cell * model.cell_px + model.cell_px / 2;
-    return at < length ? at : length - 1;
+  STILLMAP_HD bool measured(int32_t row, int32_t col) const {
+    return depth_m.at(model.middle_row(row), model.middle_col(col)) > 0.0f;
+  }
+  /// Cells from this one to the next measured one of the row; kNarrowCells + 1: there is none near.
+  STILLMAP_HD int32_t gap_to(int32_t row, int32_t col, int32_t step) const {
+    for (int32_t n = 0; n <= kNarrowCells; ++n) {
+      const int32_t c = col + n * step;
+      if (c < 0 || c >= model.cell_cols) break;
+      if (measured(row, c)) return n;
+    }
+    return kNarrowCells + 1;
+  }
+  STILLMAP_HD bool reaches_echo(int32_t row, int32_t col) const {
+    const Vec3 aim = echo.place_cam + echo.until_m * echo.axis_cam;
+    if (!(aim.z > 0.0f)) return false;
+    const Pixel at = project(model.k, aim);
+    return walk_to_echo(row, col, 0, at.u < static_cast<float>(model.middle_col(col)) ? -1 : 1) ||
+           walk_to_echo(row, col, at.v < static_cast<float>(model.middle_row(row)) ? -1 : 1, 0);
+  }
+  STILLMAP_HD bool walk_to_echo(int32_t row, int32_t col, int32_t down, int32_t right) const {
+    for (; row >= 0 && row < model.cell_rows && col >= 0 && col < model.cell_cols;
+         row += down, col += right) {
+      if (measured(row, col)) return false;
+      const auto u = static_cast<float>(model.middle_col(col)), v = static_cast<float>(model.middle_row(row));
+      if (echo.may_be_on(unproject(model.k, u, v, 1.0f))) return true;
+    }
+    return false;
   }
 };
 
@@ -152,10 +206,11 @@ STILLMAP_HD VirtualDepth cast_into(const TemporaryModel& model, int32_t row, int
 ///                                                                              test: temporary_model_test
 struct CompletePass {
   TemporaryModel model;
-  ImageView<const float> depth_m;  ///< of the target, 0: invalid
-  ImageView<const uint8_t> mask;   ///< of the target
-  ImageView<float> completed_m;    ///< 0: stays invalid
-  NearEcho echo;                   ///< of the target
+  ImageView<const float> depth_m;   ///< of the target, 0: invalid
+  ImageView<const uint8_t> mask;    ///< of the target
+  ImageView<float> completed_m;     ///< 0: stays invalid
+  ImageView<const uint8_t> silent;  ///< see SilentCellPass
+  NearEcho echo;                    ///< of the target
   float far_m = 0;
 
   STILLMAP_HD void operator()(int32_t row, int32_t col) const {
@@ -172,7 +227,7 @@ struct CompletePass {
       case VirtualDepth::surface:
         return found_m;
       case VirtualDepth::nothing:
-        return far_m;
+        return silent.at(row / model.cell_px, col / model.cell_px) != 0 ? 0.0f : far_m;
       case VirtualDepth::unsure:
         break;
     }

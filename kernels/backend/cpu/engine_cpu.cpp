@@ -654,8 +654,14 @@ IntegrateResult CpuEngine::integrate_kept(uint32_t index) {
   const CompletePass pass = memory_.kept.completion_of(index, frames, frames);
   std::fill_n(pass.model.start.data, pass.model.start.size, TemporaryModel::kNoStart);
   const StartDepthPass start{pass.model};
-  pool_.for_each(static_cast<uint32_t>(pass.model.frames),
-                 [&](uint32_t frame) { loops_.start_depth(start, static_cast<int32_t>(frame)); });
+  const SilentCellPass silent = memory_.kept.silent_cells_of(pass);
+  const auto frames_of_model = static_cast<uint32_t>(pass.model.frames);
+  pool_.for_each(frames_of_model + 1, [&](uint32_t i) {
+    if (i < frames_of_model)
+      loops_.start_depth(start, static_cast<int32_t>(i));
+    else
+      loops_.silent_cells(silent);
+  });
   in_row_tiles(k().height, [&](int32_t first, int32_t last) { loops_.complete(pass, first, last); });
   const KeptFrame& kept = memory_.kept.at(index);
   return fuse({pass.completed_m, kept.luma_chroma, kept.mask}, kept.T_map_cam);

@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <memory>
 
-#include "kernels/engine.hpp"
 #include "kernels/complete/temporary_model.hpp"
+#include "kernels/engine.hpp"
 #include "kernels/integrate/depth_range.hpp"
 #include "kernels/integrate/integrate_pass.hpp"
 #include "kernels/integrate/visible_blocks.hpp"
@@ -38,6 +38,7 @@ struct CpuLoops {
   void (*integrate)(const IntegratePass&, View<const VisibleBlock>);
   /// Of one frame of the model.
   void (*start_depth)(const StartDepthPass&, int32_t frame);
+  void (*silent_cells)(const SilentCellPass&);
   void (*complete)(const CompletePass&, int32_t first_row, int32_t last_row);
 };
 

@@ -94,6 +94,7 @@ struct DeviceStates {
   } places;
   struct Complete {
     StartDepthPass start;
+    SilentCellPass silent;
     CompletePass pass;
   } complete;
   MapCounters counters;
@@ -380,9 +381,7 @@ class DeviceEngine : public Engine {
   }
   /// One level can be left out: what is recorded cannot change.
   void limit_finest_level(int32_t level) override { finest_level_ = std::clamp(level, 0, 1); }
-  IntegrateResult integrate(const Se3& T_world_cam) override {
-    return fuse(prepared_images(), T_world_cam);
-  }
+  IntegrateResult integrate(const Se3& T_world_cam) override { return fuse(prepared_images(), T_world_cam); }
   uint32_t keep_frame(const Se3& T_world_cam, const NearEcho& echo) override;
   IntegrateResult integrate_kept(uint32_t index) override;
   void forget_kept(uint32_t oldest) override { d_.kept.forget(oldest); }

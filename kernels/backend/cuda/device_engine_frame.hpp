@@ -458,6 +458,7 @@ void DeviceEngine<Device>::launch_complete() {
   static_assert(TemporaryModel::kNoStart == 0xffffffffu);
   device_.fill(model.start.data, 0xff, uint64_t{model.start.size} * sizeof(uint32_t));
   launch_all(model.start.size, StartDepthKernel{&state.start});
+  launch_pixels(PixelKernel<SilentCellPass>{&state.silent, model.cell_rows, model.cell_cols});
   launch_pixels(PixelKernel<CompletePass>{&state.pass, k().height, k().width});
 }
 
@@ -469,6 +470,7 @@ IntegrateResult DeviceEngine<Device>::integrate_kept(uint32_t index) {
   DeviceStates::Complete& state = h_.states->complete;
   state.pass = d_.kept.completion_of(index, h_.model_frames.data, d_.model_frames.data);
   state.start = {state.pass.model};
+  state.silent = d_.kept.silent_cells_of(state.pass);
   if (!play(DeviceStep::complete)) return failed;
   const KeptFrame& kept = d_.kept.at(index);
   return fuse({state.pass.completed_m, kept.luma_chroma, kept.mask}, kept.T_map_cam);
