@@ -560,7 +560,7 @@ void synchronous_movers(double t, World& world) {
 // ---- out of range
 
 Se3d hall_camera(double t) {
-  static const Sway sway = {{-5.0, 0.0, 1.36}, {0.12, 0.36, 0.06}, {6.3, 4.6, 4.9}, 0, 8, 5.7, -9, 2.5, 4.7};
+  static const Sway sway = {{-5.0, 0.0, 1.36}, {0.12, 0.36, 0.06}, {6.3, 4.6, 4.9}, 0, 8, 5.7, -5, 2.5, 4.7};
   return sway_camera(sway, t);
 }
 

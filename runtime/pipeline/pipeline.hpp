@@ -91,7 +91,7 @@ class Pipeline {
   void start_new_map();
 
   /// After the last frame: maps those that wait to be completed (depth.invalid = complete), so that the map
-  /// holds all that was seen. As long as so many integrations.                        test: completion_test
+  /// holds all that was seen. As long as so many integrations.                        test: pipeline_test
   void finish();
 
   /// Where the map is needed, metres: around the camera, or where a lost one is looked for.
