@@ -126,6 +126,10 @@ void check_depth(const Config& config, Violations& out) {
   const DepthParams& depth = config.depth;
   out.unless(depth.min_m < depth.max_m, setting("depth.min_m", depth.min_m) +
                                             ": must be below depth.max_m = " + float_text(depth.max_m));
+  out.unless(depth.invalid == InvalidDepth::ignore || depth.far_m > depth.max_m,
+             setting("depth.far_m", depth.far_m) + ": with depth.invalid = \"complete\" it must be above " +
+                 "depth.max_m = " + float_text(depth.max_m) +
+                 ", or what is out of range becomes a surface there");
 }
 
 void check_track(const Config& config, Violations& out) {
@@ -181,12 +185,6 @@ void check_runtime(const RuntimeConfig& runtime, Violations& out) {
                std::string(name) + " = \"" + cpus + "\": expected a set of CPUs such as \"0,2-3\"");
 }
 
-void check_missing_parts(const Config& config, Violations& out) {
-  const char* missing = " is not part of this build; ";
-  if (config.depth.invalid == InvalidDepth::complete)
-    out.add(std::string("depth.invalid = complete") + missing + "set depth.invalid = \"ignore\"");
-}
-
 }  // namespace
 
 std::vector<std::string> violations(const Config& config) {
@@ -203,7 +201,6 @@ std::vector<std::string> violations(const Config& config) {
   check_archive(config, out);
   check_record(config.record, out);
   check_runtime(config.runtime, out);
-  check_missing_parts(config, out);
   return out.take();
 }
 

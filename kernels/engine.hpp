@@ -9,6 +9,7 @@
 #include "kernels/base/se3.hpp"
 #include "kernels/base/status.hpp"
 #include "kernels/base/view.hpp"
+#include "kernels/complete/near_echo.hpp"
 #include "kernels/params.hpp"
 #include "kernels/prepare/depth_bias.hpp"
 
@@ -175,6 +176,18 @@ class Engine {
   /// Allocates on unmasked rays, fuses, carves (paper III-A, III-D).
   virtual IntegrateResult integrate(const Se3& T_world_cam) = 0;
 
+  /// With depth.invalid = complete (paper III-E), instead of `integrate`: the last prepared frame with its
+  /// mask waits until others have been seen. There is room for depth.complete_frames and one more; then the
+  /// oldest goes.
+  /// @param echo what the sonar heard when it was taken  @return how many are kept now
+  virtual uint32_t keep_frame(const Se3& T_world_cam, const NearEcho& echo) = 0;
+  /// Completes the i-th oldest kept frame from all the others and fuses it, as `integrate` does. It stays.
+  /// @return unavailable: there is no such frame
+  virtual IntegrateResult integrate_kept(uint32_t index) = 0;
+  /// Of the kept frames the `oldest` oldest ones go.
+  virtual void forget_kept(uint32_t oldest) = 0;
+  virtual uint32_t kept_frames() const = 0;
+
   /// Keeps the last prepared frame as a keyframe when it shows something new. Masked pixels have no say.
   virtual void remember_place(const Se3& T_map_cam) = 0;
   /// Looks for the pose of the last prepared frame: relocalise.tries keyframes and, at attempt 0, the guess.
@@ -230,7 +243,7 @@ class Engine {
   /// Undistorted colour of the last prepared frame.
   virtual ImageView<const Rgb8> colour_image() const = 0;
   virtual MapHealth map_health() const = 0;
-  /// Forgets the map and its keyframes; memory stays.
+  /// Forgets the map, its keyframes and the frames that wait for it; memory stays.
   virtual void reset_map() = 0;
 };
 

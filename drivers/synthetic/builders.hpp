@@ -23,6 +23,9 @@ void furnished_room(World& world);
 void bare_room(World& world);
 /// Eight furnished rooms of 5 x 4 m in two rows, 20 x 8 m together, joined to a ring by doors 1.1 m wide.
 void suite_of_rooms(World& world);
+/// 14 x 9 x 4.5 m, the camera at its west end: but for some floor, boxes and two columns all is out of its
+/// range.
+void hall(World& world);
 /// 66 m along x, 2.4 m wide, no two stretches alike; |y| < 0.65 is free for the camera.
 void corridor(World& world);
 

@@ -341,4 +341,22 @@ void suite_of_rooms(World& world) {
     }
 }
 
+void hall(World& world) {
+  constexpr Vec3 kHalfM = {7.0f, 4.5f, 2.25f};
+  world.room = {{Pattern::planks, {112, 80, 52}, {190, 150, 106}, 0.16f, 3},
+                {Pattern::paint, {226, 226, 222}, {204, 206, 208}, 0.6f, 4}};
+  add(world, {Kind::room, false, kHalfM, {Mat3{}, {0, 0, kHalfM.z}}, wallpaper(2)});
+  for (const float y : {-2.05f, 2.05f})
+    add(world, make_capsule({-1.45f, y, 0.0f}, {-1.45f, y, 4.3f}, 0.22f, print({150, 160, 170}, 0.14f, 20)));
+  add(world, make_box({-1.75f, 1.42f, 0.42f}, {0.26f, 0.30f, 0.42f}, wood(11), 0.3f));
+  add(world, make_box({-1.72f, 1.38f, 0.98f}, {0.17f, 0.20f, 0.14f}, print({170, 60, 50}, 0.06f, 21), -0.2f));
+  add(world,
+      make_box({-1.70f, -1.40f, 0.56f}, {0.28f, 0.32f, 0.56f}, print({60, 130, 90}, 0.11f, 22), -0.35f));
+  add(world, make_ellipsoid({-1.70f, -1.40f, 1.27f}, {0.16f, 0.16f, 0.15f},
+                            {Pattern::stripes, {40, 80, 150}, {220, 225, 235}, 0.07f, 5}));
+  add(world, make_block({-1.30f, -0.75f, 0.0f}, {-0.90f, 0.85f, 0.44f}, wood(12)));  // a bench
+  add(world, make_block({-4.20f, -1.50f, 0.0f}, {-1.20f, 1.10f, 0.008f},
+                        {Pattern::checks, {130, 50, 46}, {196, 160, 110}, 0.3f, 6}));
+}
+
 }  // namespace stillmap::synthetic

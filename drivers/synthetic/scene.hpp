@@ -70,6 +70,7 @@ struct Scene {
   void (*movers)(double t_s, World& world);
   Se3d (*camera)(double t_s);
   bool (*covered)(double t_s) = nullptr;  ///< a hand lies on the lens; null: never
+  bool sonar = false;                     ///< frames come with a reading (sonar.hpp)
 };
 
 /// @return null when there is no such scene (names without "-static").

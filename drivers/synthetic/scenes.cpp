@@ -557,6 +557,49 @@ void synchronous_movers(double t, World& world) {
   }
 }
 
+// ---- out of range
+
+Se3d hall_camera(double t) {
+  static const Sway sway = {{-5.0, 0.0, 1.36}, {0.12, 0.36, 0.06}, {6.3, 4.6, 4.9}, 0, 8, 5.7, -5, 2.5, 4.7};
+  return sway_camera(sway, t);
+}
+
+/// Three people who cross before what is too far to be measured.
+void hall_movers(double t, World& world) {
+  const Spot2 wings[3] = {{-2.95, 3.0}, {-2.55, -3.2}, {-3.35, -2.7}};
+  const double from[3] = {0.6, 0.8, 1.6}, to[3] = {3.0, 3.6, 4.2};
+  for (int who = 0; who < 3; ++who) {
+    const auto path = [&](double s) {
+      const Spot2 lanes[3] = {{-2.95 + 0.08 * wave(s, 3.7), 0.95 * wave(s, 6.1, 0.12)},
+                              {-2.50 + 0.08 * wave(s, 4.3), -1.05 * wave(s, 6.9, 0.08)},
+                              {-3.35 + 0.06 * wave(s, 5.1), 0.85 * wave(s, 5.3, 0.60)}};
+      return mixed(wings[who], lanes[who], rise(from[who], to[who], s));
+    };
+    add_person(world, walk(path, t, {-0.25, 0.0}), static_cast<uint32_t>(who));
+  }
+}
+
+// ---- too near
+
+constexpr double kHandComes_s = 1.6, kHandThere_s = 2.6;
+
+/// A hand, from the side, to 20 cm before the lens, where it stays; the arm lies hidden behind it.
+void near_movers(double t, World& world) {
+  const auto aside = static_cast<float>(0.34 * (1.0 - rise(kHandComes_s, kHandThere_s, t)));
+  const Se3 T_world_cam = cast<float>(static_camera(t));
+  const Material skin = {Pattern::cloud, {214, 168, 140}, {190, 140, 112}, 0.02f, 7};
+  const Vec3 palm_cam = {aside, -0.04f, 0.20f};
+  const auto put = [&](Shape shape) {
+    shape.moving = true;
+    world.shapes.push_back(shape);
+  };
+  Shape palm = make_ellipsoid({}, {0.050f, 0.058f, 0.022f}, skin);
+  palm.T_world_local = T_world_cam * Se3{Mat3{}, palm_cam};
+  put(palm);
+  put(make_capsule(T_world_cam * (1.15f * palm_cam), T_world_cam * (2.4f * palm_cam), 0.036f,
+                   {Pattern::stripes, {40, 60, 130}, {220, 222, 230}, 0.05f, 1}));
+}
+
 // ---- a hand on the lens
 
 /// Sees the whole east half of the room within the first 6 s, then again and again.
@@ -607,7 +650,9 @@ const std::vector<Scene>& all_scenes() {
       {"covered", 16, false, furnished_room, no_movers, looking_about_camera, hand_on_lens},
       {"camera_kidnapped", 14, false, furnished_room, no_movers, kidnapped_camera, carried_off},
       {"long_loop", 57, false, suite_of_rooms, no_movers, long_loop_camera},
-      {"corridor", 136, false, corridor, no_movers, corridor_camera}};
+      {"corridor", 136, false, corridor, no_movers, corridor_camera},
+      {"hall", 12, true, hall, hall_movers, hall_camera, nullptr, true},
+      {"near", 10, true, furnished_room, near_movers, static_camera, nullptr, true}};
   return scenes;
 }
 

@@ -7,6 +7,7 @@
 #include "drivers/synthetic/renderer.hpp"
 #include "drivers/synthetic/scene.hpp"
 #include "drivers/synthetic/sensor_model.hpp"
+#include "drivers/synthetic/sonar.hpp"
 #include "drivers/synthetic/spec.hpp"
 #include "kernels/backend/cpu/thread_pool.hpp"
 
@@ -59,6 +60,7 @@ class SyntheticSource final : public FrameSource {
     renderer_.render(synthetic::world_at(*spec_.scene, t_s, spec_.without_movers), T_world_cam, workers_,
                      images_);
     if (spec_.scene->covered != nullptr && spec_.scene->covered(t_s)) synthetic::cover_lens(images_);
+    frame.sonar_m = spec_.scene->sonar ? synthetic::sonar_reading_m(images_, info_.camera.k) : 0.0f;
     sensor_.measure(images_, index, t_s, workers_, frame.depth_raw, frame.colour);
     if (frame.truth_mask.data != nullptr) copy_mask(frame.truth_mask);
     frame.truth_T_world_cam = T_world_cam;

@@ -157,7 +157,7 @@ class Relocalisations {
     Pipeline pipeline(*engine_, config_);
     FrameSlot slot(info);
     while ((*source)->next(slot.frame(), 1000) == Status::ok && !stop_requested()) {
-      const FrameResult result = pipeline.process(slot.frame());
+      const FrameResult result = pipeline.process(slot.frame(), {.sonar_m = slot.frame().sonar_m});
       T_map_cam_ = result.T_map_cam;
       if (!truth_.anchored()) truth_.anchor(result.T_map_cam, *slot.frame().truth_T_world_cam);
       drift_m_ = norm(T_map_cam_.translation - truth_.to_map(*slot.frame().truth_T_world_cam).translation);

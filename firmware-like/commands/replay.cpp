@@ -181,6 +181,7 @@ int replay(const std::string& log, const std::string& out, bool quiet) {
   outputs.show_progress(&progress);
   Replay loop(source, *engine, pipeline, archive.get(), outputs);
   const std::string error = loop.run();
+  pipeline.finish();
   progress.finish();
   outputs.show_progress(nullptr);
   const std::string why = difference(source, loop);

@@ -32,6 +32,8 @@ void FrameLoop::run() {
     else if (ended)
       break;
   }
+  const heap_guard::Scope armed;
+  p_.pipeline.finish();
 }
 
 void FrameLoop::work_on(uint32_t slot) {

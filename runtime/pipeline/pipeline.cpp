@@ -40,6 +40,23 @@ PosePrior prior_from(const PredictedPose& expected, const TrackParams& p) {
   return prior;
 }
 
+/// What the sonar said about the frame that is nearer than the camera sees.
+NearEcho near_echo(const SonarConfig& sonar, float range_m) {
+  NearEcho echo;
+  if (!(range_m > 0.0f && range_m < sonar.veto_m)) return echo;
+  constexpr float kHalfDegree = 3.14159265f / 360.0f;
+  const auto& T = sonar.T_cam_sonar;
+  const float x = T[3], y = T[4], z = T[5], w = T[6];
+  echo.place_cam = {T[0], T[1], T[2]};
+  // The z axis after the rotation.
+  echo.axis_cam =
+      normalized(Vec3{2.0f * (x * z + w * y), 2.0f * (y * z - w * x), w * w - x * x - y * y + z * z});
+  echo.cos_half_beam = std::cos(kHalfDegree * sonar.beam_deg);
+  echo.range_m = range_m;
+  echo.until_m = sonar.veto_m;
+  return echo;
+}
+
 }  // namespace
 
 Pipeline::Pipeline(Engine& engine, const Config& config, const Se3d& T_map_cam, OdometryPort* odometry)
@@ -56,6 +73,7 @@ void Pipeline::start_lost(const Se3d& T_map_cam_guess) {
 }
 
 void Pipeline::start_new_map() {
+  counters_.not_mapped += engine_.kept_frames();
   engine_.reset_map();
   relocaliser_.forget();
   T_map_cam_ = predictor_.predict(stamp_).T_map_cam;
@@ -104,13 +122,41 @@ void Pipeline::announce(const FrameResult& result) {
   if (listener_ != nullptr && result.state != TrackingState::lost) listener_->pose_known(result);
 }
 
-void Pipeline::integrate(const Se3& T_map_cam, FrameResult& result) {
-  const IntegrateResult integrated = engine_.integrate(T_map_cam);
+void Pipeline::note(const IntegrateResult& integrated) {
   counters_.most_visible_blocks = std::max(counters_.most_visible_blocks, integrated.visible_voxel_blocks);
+}
+
+void Pipeline::integrate(const Se3& T_map_cam, FrameResult& result) {
+  note(engine_.integrate(T_map_cam));
   result.integrated = true;
 }
 
-/// The first frame is the map: it is taken as static.
+/// A registered frame into the map; when its depth is to be completed (paper III-E), it waits for
+/// depth.complete_frames more and the one that has waited so long goes into the map.
+void Pipeline::map(const Se3& T_map_cam, FrameResult& result) {
+  if (config_.depth.invalid == InvalidDepth::ignore) return integrate(T_map_cam, result);
+  const uint32_t kept = engine_.keep_frame(T_map_cam, near_echo(config_.sonar, work_.sonar_m));
+  if (kept <= static_cast<uint32_t>(config_.depth.complete_frames)) return;
+  note(engine_.integrate_kept(0));
+  engine_.forget_kept(1);
+  result.integrated = true;
+}
+
+/// What was seen right before the camera was lost is not sure enough for the map.
+void Pipeline::give_up_kept() {
+  const uint32_t kept = engine_.kept_frames();
+  counters_.not_mapped += kept;
+  engine_.forget_kept(kept);
+}
+
+void Pipeline::finish() {
+  const uint32_t kept = engine_.kept_frames();
+  for (uint32_t i = 0; i < kept; ++i) note(engine_.integrate_kept(i));
+  engine_.forget_kept(kept);
+}
+
+/// The first frame is the map: it is taken as static. It is mapped at once, as it was measured, so that there
+/// is something to track against.
 FrameResult Pipeline::start_map(FrameResult result) {
   StopWatch watch;
   result.p_good = 1.0f;
@@ -165,7 +211,7 @@ FrameResult Pipeline::track_and_map(FrameResult result) {
   announce(result);
   // A poor pose freezes the map.
   if (result.state == TrackingState::good && work_.integrate && config_.pipeline.mapping)
-    integrate(refined.T_world_cam, result);
+    map(refined.T_world_cam, result);
   result.ms.integrate_ms = watch.lap_ms();
   return result;
 }
@@ -216,6 +262,7 @@ void Pipeline::remember(const FrameResult& result) {
     predictor_.update(result.stamp, result.T_map_cam);
   if (!lost) lost_since_.reset();
   if (lost && !lost_since_) lost_since_ = result.stamp;
+  if (lost) give_up_kept();
   lost_ = lost;
   measure_period(result.stamp);
   stamp_ = result.stamp;

@@ -62,6 +62,8 @@ struct PipelineCounters {
   uint32_t relocalised = 0;          ///< returns from lost
   uint32_t most_visible_blocks = 0;  ///< with voxels, in one frame: the least that map.pool_blocks must hold
   uint32_t new_maps = 0;             ///< started because the camera was not found again
+  uint32_t not_mapped =
+      0;  ///< frames that waited to be completed when the camera was lost or the map given up
 };
 
 /// @thread real-time thread; `process` does not allocate, lock, touch files or throw
@@ -91,6 +93,10 @@ class Pipeline {
   /// pipeline_test
   void start_new_map();
 
+  /// After the last frame: maps those that wait to be completed (depth.invalid = complete), so that the map
+  /// holds all that was seen. As long as so many integrations.                        test: pipeline_test
+  void finish();
+
   /// Where the map is needed, metres: around the camera, or where a lost one is looked for.
   Vec3 centre_map() const {
     return lost_ && relocaliser_.enabled() ? relocaliser_.last().T_map_wanted.translation
@@ -102,6 +108,9 @@ class Pipeline {
  private:
   void announce(const FrameResult& result);
   void integrate(const Se3& T_map_cam, FrameResult& result);
+  void map(const Se3& T_map_cam, FrameResult& result);
+  void note(const IntegrateResult& integrated);
+  void give_up_kept();
   FrameResult start_map(FrameResult result);
   FrameResult track_and_map(FrameResult result);
   TrackResult first_registration(const PosePrior& prior);

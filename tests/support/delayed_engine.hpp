@@ -31,6 +31,13 @@ class DelayedEngine final : public Engine {
     wait(delays_.integrate_ms);
     return engine_.integrate(T);
   }
+  uint32_t keep_frame(const Se3& T, const NearEcho& echo) override { return engine_.keep_frame(T, echo); }
+  IntegrateResult integrate_kept(uint32_t index) override {
+    wait(delays_.integrate_ms);
+    return engine_.integrate_kept(index);
+  }
+  void forget_kept(uint32_t oldest) override { engine_.forget_kept(oldest); }
+  uint32_t kept_frames() const override { return engine_.kept_frames(); }
   void remember_place(const Se3& T) override { engine_.remember_place(T); }
   PlaceResult find_place(const Se3& T, int32_t attempt) override { return engine_.find_place(T, attempt); }
   PlaceResult confirm_place(const Se3& T) override { return engine_.confirm_place(T); }

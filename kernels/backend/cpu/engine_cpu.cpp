@@ -11,6 +11,7 @@
 #include "kernels/backend/cpu/raycast.hpp"
 #include "kernels/backend/cpu/relocalise.hpp"
 #include "kernels/backend/cpu/thread_pool.hpp"
+#include "kernels/complete/kept_frames.hpp"
 #include "kernels/engine.hpp"
 #include "kernels/frame_rules.hpp"
 #include "kernels/mask/grow_mask.hpp"
@@ -50,6 +51,8 @@ struct CpuMemory {
   View<uint8_t> extract_scratch, raycast_scratch;
   MapStorage map;
   CpuRelocaliser relocaliser;
+  KeptFrames kept;
+  View<ModelFrame> model_frames;
 
   void carve(Arena& arena, const EngineParams& p) {
     const int32_t rows = p.camera.k.height, cols = p.camera.k.width;
@@ -74,6 +77,9 @@ struct CpuMemory {
     raycast_scratch = arena.take<uint8_t>("mesh and views", raycast_scratch_bytes());
     map.carve(arena, p.map, p.integrate.weight_cap);
     relocaliser.carve(arena, p);
+    kept.carve(arena, "completed depth", p);
+    if (p.depth.invalid == InvalidDepth::complete)
+      model_frames = arena.take<ModelFrame>("completed depth", kMostModelFrames);
   }
 
  private:
@@ -142,7 +148,11 @@ class CpuEngine final : public Engine {
   void limit_finest_level(int32_t level) override {
     finest_level_ = std::clamp(level, 0, params_.track.levels - 1);
   }
-  IntegrateResult integrate(const Se3& T_world_cam) override;
+  IntegrateResult integrate(const Se3& T_world_cam) override { return fuse(prepared_view(), T_world_cam); }
+  uint32_t keep_frame(const Se3& T_world_cam, const NearEcho& echo) override;
+  IntegrateResult integrate_kept(uint32_t index) override;
+  void forget_kept(uint32_t oldest) override { memory_.kept.forget(oldest); }
+  uint32_t kept_frames() const override { return memory_.kept.count(); }
   void remember_place(const Se3& T_map_cam) override {
     memory_.relocaliser.remember(prepared_view(), T_map_cam);
   }
@@ -190,6 +200,7 @@ class CpuEngine final : public Engine {
   void reset_map() override {
     memory_.map.clear();
     memory_.relocaliser.clear();
+    memory_.kept.forget(memory_.kept.count());
     forget_cells();
     groups_looked_at_ = 0;
   }
@@ -226,7 +237,7 @@ class CpuEngine final : public Engine {
     });
   }
   void set_nothing_masked();
-  void update_static_depth();
+  void update_static_depth(const PreparedView& frame);
   FrameGeometry frame_geometry() const {
     return {memory_.static_depth_m,       k(),
             params_.depth.min_m,          params_.depth.max_m,
@@ -246,6 +257,7 @@ class CpuEngine final : public Engine {
   bool look_at_groups(const VisibleGroupPass& pass);
   Status list_visible(const VisibleGroupPass& pass, uint32_t& visible_count);
   void merge_free(const VisibleGroupPass& pass, View<const VisibleBlock> visible);
+  IntegrateResult fuse(const PreparedView& frame, const Se3& T_world_cam);
   bool dense() const { return params_.map.free_space == FreeSpace::dense; }
 
   EngineParams params_;
@@ -503,9 +515,9 @@ void CpuEngine::mask_by_residual(const Se3& T_world_cam) {
   for (int32_t i = 0; i < image.pixels(); ++i) memory_.trust.data[i] = image.data[i] ? 0 : 255;
 }
 
-void CpuEngine::update_static_depth() {
+void CpuEngine::update_static_depth(const PreparedView& frame) {
   DepthRangePyramid& ranges = memory_.ranges;
-  const StaticDepthPass pass{memory_.depth_m, memory_.mask, params_.integrate.through_movers,
+  const StaticDepthPass pass{frame.depth_m, frame.mask, params_.integrate.through_movers,
                              memory_.static_depth_m, ranges.level[0]};
   pool_.for_each(static_cast<uint32_t>(pass.tiles.rows),
                  [&](uint32_t row) { loops_.static_depth(pass, static_cast<int32_t>(row)); });
@@ -590,13 +602,13 @@ void CpuEngine::merge_free(const VisibleGroupPass& pass, View<const VisibleBlock
     if (memory_.groups[g].free) memory_.map.merge_group(pass.group_at(g));
 }
 
-IntegrateResult CpuEngine::integrate(const Se3& T_world_cam) {
+IntegrateResult CpuEngine::fuse(const PreparedView& frame, const Se3& T_world_cam) {
   IntegrateResult result;
   if (memory_.map.above_high_water()) {
     memory_.map.drop_farthest(T_world_cam.translation, InView(*this, 0.0f));
     result.status = Status::capacity_exhausted;
   }
-  update_static_depth();
+  update_static_depth(frame);
   const FrameGeometry geometry = frame_geometry();
   const VisibleGroupPass visible = visible_pass(T_world_cam, geometry);
   last_view_ = visible;
@@ -604,7 +616,7 @@ IntegrateResult CpuEngine::integrate(const Se3& T_world_cam) {
   if (listed != Status::ok) result.status = listed;
   const IntegratePass pass{memory_.map.view(),
                            geometry,
-                           memory_.luma_chroma.data,
+                           frame.colour.data,
                            visible.T_cam_map,
                            {static_cast<float>(kSdfMax) / params_.map.truncation_m,
                             static_cast<float>(params_.integrate.weight_cap), params_.integrate.relearn},
@@ -623,6 +635,40 @@ IntegrateResult CpuEngine::integrate(const Se3& T_world_cam) {
   return result;
 }
 
+uint32_t CpuEngine::keep_frame(const Se3& T_world_cam, const NearEcho& echo) {
+  if (params_.depth.invalid != InvalidDepth::complete) return 0;
+  KeptFrame& frame = memory_.kept.add();
+  std::copy_n(memory_.depth_m.data, memory_.depth_m.pixels(), frame.depth_m.data);
+  std::copy_n(memory_.luma_chroma.data, memory_.luma_chroma.pixels(), frame.luma_chroma.data);
+  std::copy_n(memory_.mask.data, memory_.mask.pixels(), frame.mask.data);
+  frame.T_map_cam = T_world_cam;
+  frame.echo = echo;
+  return kept_frames();
+}
+
+IntegrateResult CpuEngine::integrate_kept(uint32_t index) {
+  if (index >= kept_frames()) {
+    IntegrateResult none;
+    none.status = Status::unavailable;
+    return none;
+  }
+  ModelFrame* const frames = memory_.model_frames.data;
+  const CompletePass pass = memory_.kept.completion_of(index, frames, frames);
+  std::fill_n(pass.model.start.data, pass.model.start.size, TemporaryModel::kNoStart);
+  const StartDepthPass start{pass.model};
+  const SilentCellPass silent = memory_.kept.silent_cells_of(pass);
+  const auto frames_of_model = static_cast<uint32_t>(pass.model.frames);
+  pool_.for_each(frames_of_model + 1, [&](uint32_t i) {
+    if (i < frames_of_model)
+      loops_.start_depth(start, static_cast<int32_t>(i));
+    else
+      loops_.silent_cells(silent);
+  });
+  in_row_tiles(k().height, [&](int32_t first, int32_t last) { loops_.complete(pass, first, last); });
+  const KeptFrame& kept = memory_.kept.at(index);
+  return fuse({pass.completed_m, kept.luma_chroma, kept.mask}, kept.T_map_cam);
+}
+
 uint32_t CpuEngine::wanted_groups(View<ArchivedGroup> groups) const {
   const InView in_view(*this, 0.0f);
   uint32_t count = 0;
@@ -639,7 +685,7 @@ PlaceResult CpuEngine::find_place(const Se3& T_map_cam_guess, int32_t attempt) {
   const PlaceResult result =
       memory_.relocaliser.find(prepared_view(), memory_.map.view(), T_map_cam_guess, attempt, pool_);
   if (result.status == Status::ok || memory_.map.health().archived_groups == 0) return result;
-  update_static_depth();
+  update_static_depth(prepared_view());
   last_view_ = visible_pass(result.T_map_wanted, frame_geometry());
   look_at_groups(last_view_);
   return result;

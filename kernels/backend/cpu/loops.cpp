@@ -284,11 +284,25 @@ void integrate(const IntegratePass& pass, View<const VisibleBlock> blocks) {
   for (const VisibleBlock block : blocks) pass(block, RowVoxels{});
 }
 
+void start_depth(const StartDepthPass& pass, int32_t frame) {
+  for (int32_t r = 0; r < pass.model.cell_rows; ++r)
+    for (int32_t c = 0; c < pass.model.cell_cols; ++c) pass(frame, r, c);
+}
+void silent_cells(const SilentCellPass& pass) {
+  for (int32_t r = 0; r < pass.silent.rows; ++r)
+    for (int32_t c = 0; c < pass.silent.cols; ++c) pass(r, c);
+}
+void complete(const CompletePass& pass, int32_t first_row, int32_t last_row) {
+  for (int32_t r = first_row; r < last_row; ++r)
+    for (int32_t c = 0; c < pass.depth_m.cols; ++c) pass(r, c);
+}
+
 }  // namespace
 
 extern const CpuLoops STILLMAP_LOOPS;
-const CpuLoops STILLMAP_LOOPS = {STILLMAP_LOOPS_NAME, prepare,       track,       residual_mask,  cell_depth,
-                                 cell_normals,        cell_evidence, still_cells, dynamic_pixels, trust,
-                                 static_depth,        visible_group, integrate};
+const CpuLoops STILLMAP_LOOPS = {STILLMAP_LOOPS_NAME, prepare,      track,         residual_mask,
+                                 cell_depth,          cell_normals, cell_evidence, still_cells,
+                                 dynamic_pixels,      trust,        static_depth,  visible_group,
+                                 integrate,           start_depth,  silent_cells,  complete};
 
 }  // namespace stillmap

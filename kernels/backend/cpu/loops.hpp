@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 
+#include "kernels/complete/temporary_model.hpp"
 #include "kernels/engine.hpp"
 #include "kernels/integrate/depth_range.hpp"
 #include "kernels/integrate/integrate_pass.hpp"
@@ -35,6 +36,10 @@ struct CpuLoops {
   void (*static_depth)(const StaticDepthPass&, int32_t tile_row);
   GroupView (*visible_group)(const VisibleGroupPass&, uint32_t group);
   void (*integrate)(const IntegratePass&, View<const VisibleBlock>);
+  /// Of one frame of the model.
+  void (*start_depth)(const StartDepthPass&, int32_t frame);
+  void (*silent_cells)(const SilentCellPass&);
+  void (*complete)(const CompletePass&, int32_t first_row, int32_t last_row);
 };
 
 extern const CpuLoops kLoopsBaseline;

@@ -22,6 +22,7 @@
 #include <cstring>
 
 #include "kernels/backend/cpu/arena.hpp"
+#include "kernels/backend/cuda/complete_kernels.hpp"
 #include "kernels/backend/cuda/map_access.hpp"
 #include "kernels/backend/cuda/map_update.hpp"
 #include "kernels/backend/cuda/mask_kernels.hpp"
@@ -29,6 +30,7 @@
 #include "kernels/backend/cuda/place_kernels.hpp"
 #include "kernels/backend/cuda/track_kernel.hpp"
 #include "kernels/backend/cuda/view_kernels.hpp"
+#include "kernels/complete/kept_frames.hpp"
 #include "kernels/engine.hpp"
 #include "kernels/extract/cube_cases.hpp"
 #include "kernels/frame_rules.hpp"
@@ -52,8 +54,9 @@ enum class DeviceStep : uint32_t {
   track_coarse,  ///< as track and refine, but not at the finest level
   refine_coarse,
   integrate,
-  look,    ///< at groups only, for the archive
-  places,  ///< small views of the frame
+  look,      ///< at groups only, for the archive
+  places,    ///< small views of the frame
+  complete,  ///< a kept frame; only with depth.invalid = complete
   count_
 };
 
@@ -89,6 +92,11 @@ struct DeviceStates {
     ShrinkPass shrink;
     HalvePass halve;
   } places;
+  struct Complete {
+    StartDepthPass start;
+    SilentCellPass silent;
+    CompletePass pass;
+  } complete;
   MapCounters counters;
   MapMail mail;
 };
@@ -146,6 +154,8 @@ struct DeviceMemory {
   View<CubeCases> cube_cases;
   SmallView small[2];
   TryScratch scratch_of_tries[PlaceStore::kMaxTries];
+  KeptFrames kept;
+  View<ModelFrame> model_frames;
 
   void carve(Arena& arena, const EngineParams& p) {
     const Intrinsics& k = p.camera.k;
@@ -166,6 +176,9 @@ struct DeviceMemory {
     carve_map(arena, p);
     carve_views(arena, static_cast<uint64_t>(p.map.pool_blocks));
     if (p.relocalise.enabled) carve_places(arena, p);
+    kept.carve(arena, "device: completed depth", p);
+    if (p.depth.invalid == InvalidDepth::complete)
+      model_frames = arena.take<ModelFrame>("device: completed depth", kMostModelFrames);
   }
 
  private:
@@ -274,6 +287,7 @@ struct SharedMemory {
   View<uint8_t> post;  ///< for whatever is asked outside of frames
   View<uint32_t> first_vertex, first_triangle;
   PlaceStore places;
+  View<ModelFrame> model_frames;
 
   void carve(Arena& arena, const EngineParams& p) {
     const Intrinsics& k = p.camera.k;
@@ -290,6 +304,8 @@ struct SharedMemory {
     first_vertex = arena.take<uint32_t>("shared: mesh, views, records", blocks);
     first_triangle = arena.take<uint32_t>("shared: mesh, views, records", blocks + 1);
     places.carve(arena, p);
+    if (p.depth.invalid == InvalidDepth::complete)
+      model_frames = arena.take<ModelFrame>("shared: completed depth", kMostModelFrames);
   }
 
  private:
@@ -365,7 +381,11 @@ class DeviceEngine : public Engine {
   }
   /// One level can be left out: what is recorded cannot change.
   void limit_finest_level(int32_t level) override { finest_level_ = std::clamp(level, 0, 1); }
-  IntegrateResult integrate(const Se3& T_world_cam) override;
+  IntegrateResult integrate(const Se3& T_world_cam) override { return fuse(prepared_images(), T_world_cam); }
+  uint32_t keep_frame(const Se3& T_world_cam, const NearEcho& echo) override;
+  IntegrateResult integrate_kept(uint32_t index) override;
+  void forget_kept(uint32_t oldest) override { d_.kept.forget(oldest); }
+  uint32_t kept_frames() const override { return d_.kept.count(); }
 
   void remember_place(const Se3& T_map_cam) override;
   PlaceResult find_place(const Se3& T_map_cam_guess, int32_t attempt) override;
@@ -405,6 +425,7 @@ class DeviceEngine : public Engine {
     clear_map();
     forget_cells();
     h_.places.clear();
+    d_.kept.forget(d_.kept.count());
     h_.states->integrate.update.groups = 0;
   }
 
@@ -469,6 +490,7 @@ class DeviceEngine : public Engine {
   void launch_count();
   void launch_look();
   void launch_integrate();
+  void launch_complete();
 
   TrustPass trust_pass(ImageView<const uint8_t> mask) const;
   void set_first_trust(const Se3& T_start);
@@ -476,7 +498,15 @@ class DeviceEngine : public Engine {
                               LevelRange levels, const PosePrior& prior);
   bool find_parts(const Se3& T_map_cam);
   void remember_cells(const Se3& T_map_cam);
-  void set_view(const Se3& T_map_cam);
+  /// Images that go into the map.
+  struct FrameImages {
+    ImageView<const float> depth_m;
+    ImageView<const LumaChroma> luma_chroma;
+    ImageView<const uint8_t> mask;
+  };
+  FrameImages prepared_images() const { return {d_.depth_m, d_.luma_chroma, d_.mask}; }
+  void set_view(const FrameImages& images, const Se3& T_map_cam);
+  IntegrateResult fuse(const FrameImages& images, const Se3& T_map_cam);
   bool shrink_frame();
   void follow(View<PoseTry> tries);
   bool drop_farthest(Vec3 centre_map);

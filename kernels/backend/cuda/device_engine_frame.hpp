@@ -40,6 +40,8 @@ void DeviceEngine<Device>::record_steps() {
       launch_mask_by_residual();
   });
   record(DeviceStep::integrate, [this] { launch_integrate(); });
+  if (params_.depth.invalid == InvalidDepth::complete)
+    record(DeviceStep::complete, [this] { launch_complete(); });
   record(DeviceStep::places, [this] {
     if (!h_.places.enabled()) return;
     send(d_.states->places, h_.states->places);
@@ -382,9 +384,9 @@ void DeviceEngine<Device>::launch_integrate() {
 
 /// States of `integrate` and `look` for a pose.
 template <class Device>
-void DeviceEngine<Device>::set_view(const Se3& T_map_cam) {
+void DeviceEngine<Device>::set_view(const FrameImages& images, const Se3& T_map_cam) {
   DeviceStates::Integrate& state = h_.states->integrate;
-  state.depth = {d_.depth_m, d_.mask, params_.integrate.through_movers, d_.static_depth_m,
+  state.depth = {images.depth_m, images.mask, params_.integrate.through_movers, d_.static_depth_m,
                  d_.ranges.level[0]};
   const FrameGeometry geometry = {
       d_.static_depth_m,       k(), params_.depth.min_m, params_.depth.max_m, params_.integrate.free_max_m,
@@ -402,7 +404,7 @@ void DeviceEngine<Device>::set_view(const Se3& T_map_cam) {
                     params_.fetch_m};
   update.fuse = {d_.map.view,
                  geometry,
-                 d_.luma_chroma.data,
+                 images.luma_chroma.data,
                  update.visible.T_cam_map,
                  {static_cast<float>(kSdfMax) / params_.map.truncation_m,
                   static_cast<float>(params_.integrate.weight_cap), params_.integrate.relearn},
@@ -415,11 +417,11 @@ void DeviceEngine<Device>::set_view(const Se3& T_map_cam) {
 }
 
 template <class Device>
-IntegrateResult DeviceEngine<Device>::integrate(const Se3& T_world_cam) {
+IntegrateResult DeviceEngine<Device>::fuse(const FrameImages& images, const Se3& T_world_cam) {
   IntegrateResult result;
   if (above_high_water() && drop_farthest(T_world_cam.translation))
     result.status = Status::capacity_exhausted;
-  set_view(T_world_cam);
+  set_view(images, T_world_cam);
   frames_ = (frames_ + 1) & 0xffff;
   if (!play(DeviceStep::integrate)) {
     result.status = Status::unavailable;
@@ -431,6 +433,49 @@ IntegrateResult DeviceEngine<Device>::integrate(const Se3& T_world_cam) {
   result.visible_voxel_blocks = update.visible_voxel_blocks;
   result.map = map_health();
   return result;
+}
+
+// complete
+
+template <class Device>
+uint32_t DeviceEngine<Device>::keep_frame(const Se3& T_world_cam, const NearEcho& echo) {
+  if (params_.depth.invalid != InvalidDepth::complete) return 0;
+  KeptFrame& frame = d_.kept.add();
+  const auto pixels = static_cast<uint64_t>(d_.depth_m.pixels());
+  device_.copy(frame.depth_m.data, d_.depth_m.data, pixels * sizeof(float));
+  device_.copy(frame.luma_chroma.data, d_.luma_chroma.data, pixels * sizeof(LumaChroma));
+  device_.copy(frame.mask.data, d_.mask.data, pixels);
+  frame.T_map_cam = T_world_cam;
+  frame.echo = echo;
+  return kept_frames();
+}
+
+template <class Device>
+void DeviceEngine<Device>::launch_complete() {
+  constexpr uint64_t kBytes = kMostModelFrames * sizeof(ModelFrame);
+  DeviceStates::Complete& state = d_.states->complete;
+  const TemporaryModel model = d_.kept.empty_model();
+  send(state, h_.states->complete);
+  device_.copy(d_.model_frames.data, h_.model_frames.data, kBytes);
+  static_assert(TemporaryModel::kNoStart == 0xffffffffu);
+  device_.fill(model.start.data, 0xff, uint64_t{model.start.size} * sizeof(uint32_t));
+  launch_all(model.start.size, StartDepthKernel{&state.start});
+  launch_pixels(PixelKernel<SilentCellPass>{&state.silent, model.cell_rows, model.cell_cols});
+  launch_pixels(PixelKernel<CompletePass>{&state.pass, k().height, k().width});
+}
+
+template <class Device>
+IntegrateResult DeviceEngine<Device>::integrate_kept(uint32_t index) {
+  IntegrateResult failed;
+  failed.status = Status::unavailable;
+  if (index >= kept_frames()) return failed;
+  DeviceStates::Complete& state = h_.states->complete;
+  state.pass = d_.kept.completion_of(index, h_.model_frames.data, d_.model_frames.data);
+  state.start = {state.pass.model};
+  state.silent = d_.kept.silent_cells_of(state.pass);
+  if (!play(DeviceStep::complete)) return failed;
+  const KeptFrame& kept = d_.kept.at(index);
+  return fuse({state.pass.completed_m, kept.luma_chroma, kept.mask}, kept.T_map_cam);
 }
 
 }  // namespace stillmap

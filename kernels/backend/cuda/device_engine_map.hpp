@@ -345,7 +345,7 @@ PlaceResult DeviceEngine<Device>::find_place(const Se3& T_map_cam_guess, int32_t
   auto all = [this](View<PoseTry> tries) { follow(tries); };
   const PlaceResult result = h_.places.find(T_map_cam_guess, attempt, follower(all));
   if (result.status == Status::ok || h_.states->counters.archived_groups == 0) return result;
-  set_view(result.T_map_wanted);
+  set_view(prepared_images(), result.T_map_wanted);
   play(DeviceStep::look);
   return result;
 }

@@ -189,9 +189,14 @@ TEST(Validate, TheLogHasRoomForTwoFilesAndFramesNeedIt) {
   EXPECT_TRUE(mentions(after([](Config& c) { c.record.frames = true; }), "record.log is false"));
 }
 
-TEST(Validate, PartsOfOtherBuildsAreNamed) {
-  EXPECT_TRUE(mentions(after([](Config& c) { c.depth.invalid = InvalidDepth::complete; }),
-                       "depth.invalid = complete is not part of this build"));
+TEST(Validate, WhatIsTakenAsFarIsOutOfRange) {
+  EXPECT_TRUE(after([](Config& c) { c.depth.invalid = InvalidDepth::complete; }).empty());
+  EXPECT_TRUE(mentions(after([](Config& c) {
+                         c.depth.invalid = InvalidDepth::complete;
+                         c.depth.far_m = c.depth.max_m;
+                       }),
+                       "must be above depth.max_m"));
+  EXPECT_TRUE(after([](Config& c) { c.depth.far_m = 1; }).empty()) << "not used";
 }
 
 TEST(CameraProblem, NamesWhatIsWrong) {

@@ -325,6 +325,47 @@ TEST(MapOnGrid, AFullMapDropsTheSameGroups) {
   EXPECT_EQ(with_blocks(records_of(pair.gpu())), with_blocks(records_of(*pair.cpu)));
 }
 
+/// Frames with zeros here and there, wide ones too, with masks and one with a hand before the sonar: kept,
+/// completed and fused.
+TEST_P(OnGrid, KeptFramesAreCompletedAsOnTheCpu) {
+  EngineParams params = small_params();
+  params.depth.invalid = InvalidDepth::complete;
+  params.depth.complete_frames = 4;
+  EnginePair pair(params, GetParam());
+  NearEcho echo;
+  echo.axis_cam = {0, 0, 1};
+  echo.cos_half_beam = 0.96f;
+  echo.range_m = 0.2f;
+  echo.until_m = 0.5f;
+  for (int i = 0; i < 9; ++i) {
+    CornerView view = view_at(i, pair.k);
+    for (size_t n = 0; n < view.depth_raw.size(); ++n) {
+      const auto col = static_cast<int>(n % 96), row = static_cast<int>(n / 96);
+      if ((n * 7 + static_cast<size_t>(i)) % 11 == 0 || (row < 30 && col > 30 && col < 80 + i))
+        view.depth_raw[n] = 0;
+    }
+    for (Engine* engine : {pair.cpu.get(), &pair.gpu()}) {
+      ASSERT_EQ(engine->prepare(frame_of(view)).status, Status::ok);
+      if (i == 0) engine->integrate(pose_at(0));
+      if (i > 0) engine->mask(pose_at(i));
+      ASSERT_EQ(engine->keep_frame(pose_at(i), i == 3 ? echo : NearEcho{}), std::min(i + 1u, 5u));
+    }
+    if (i < 4) continue;
+    const IntegrateResult a = pair.cpu->integrate_kept(0), b = pair.gpu().integrate_kept(0);
+    const std::string when = "frame " + std::to_string(i - 4) + ", completed";
+    ASSERT_EQ(a.status, b.status) << when;
+    ASSERT_EQ(a.visible_blocks, b.visible_blocks) << when;
+    expect_same_health(a.map, b.map, when);
+    pair.cpu->forget_kept(1);
+    pair.gpu().forget_kept(1);
+    expect_same_map(*pair.cpu, pair.gpu(), when);
+  }
+  EXPECT_EQ(pair.gpu().kept_frames(), 4u);
+  EXPECT_EQ(pair.gpu().integrate_kept(4).status, Status::unavailable);
+  pair.gpu().reset_map();
+  EXPECT_EQ(pair.gpu().kept_frames(), 0u);
+}
+
 TEST(MapOnGrid, WhatDoesNotFitIsLeftOutInTheSameOrder) {
   for (EngineParams params : {small_params(), paper_params()}) {
     params.map.pool_blocks = 300;

@@ -10,6 +10,7 @@
 #include "drivers/synthetic/renderer.hpp"
 #include "drivers/synthetic/scene.hpp"
 #include "drivers/synthetic/sensor_model.hpp"
+#include "drivers/synthetic/sonar.hpp"
 #include "runtime/ports/frame_source.hpp"
 
 namespace stillmap::synthetic {
@@ -124,12 +125,13 @@ TEST_P(EveryScene, starts_still_unless_it_must_not) {
 
 TEST_P(EveryScene, camera_keeps_clear_of_everything) {
   const Scene& scene = scene_named(GetParam());
+  const float to_movers_m = std::string(scene.name) == "near" ? 0.16f : 0.6f;
   for (double t = 0; t < scene.default_seconds; t += 0.1) {
     const Vec3 lens = cast<float>(scene.camera(t)).translation;
     EXPECT_GT(lens.z, 1.1f);
     EXPECT_LT(lens.z, 1.6f);
     for (const Shape& shape : world_at(scene, t, false).shapes)
-      ASSERT_GE(distance_m(shape, lens), shape.moving ? 0.6f : 0.25f) << "at " << t << " s";
+      ASSERT_GE(distance_m(shape, lens), shape.moving ? to_movers_m : 0.25f) << "at " << t << " s";
   }
 }
 
@@ -180,6 +182,61 @@ std::vector<const char*> names() {
 
 INSTANTIATE_TEST_SUITE_P(Scenes, EveryScene, testing::ValuesIn(names()),
                          [](const auto& parameter) { return std::string(parameter.param); });
+
+TEST(Scenes, most_of_the_hall_is_out_of_range_but_some_is_not) {
+  const Scene& scene = scene_named("hall");
+  ThreadPool workers(1);
+  Renderer renderer(kSceneCamera);
+  IdealImages images;
+  for (double t = 0; t < scene.default_seconds; t += 1.0) {
+    renderer.render(world_at(scene, t, true), scene.camera(t), workers, images);
+    const auto far = std::count_if(images.depth_m.begin(), images.depth_m.end(),
+                                   [](float z_m) { return z_m > kDepthMaxM; });
+    const double share = static_cast<double>(far) / static_cast<double>(images.depth_m.size());
+    EXPECT_GT(share, 0.45) << t;
+    EXPECT_LT(share, 0.75) << t;
+  }
+}
+
+TEST(Scenes, the_hand_is_nearer_than_the_camera_sees_and_before_the_sonar) {
+  const Scene& scene = scene_named("near");
+  ThreadPool workers(1);
+  Renderer renderer(kSceneCamera);
+  IdealImages images;
+  for (double t = 0; t < scene.default_seconds; t += 0.5) {
+    renderer.render(world_at(scene, t, false), scene.camera(t), workers, images);
+    size_t hand = 0, measurable = 0;
+    for (size_t i = 0; i < images.mask.size(); ++i) {
+      hand += images.mask[i] == kTrulyDynamic ? 1 : 0;
+      measurable += images.mask[i] == kTrulyDynamic && images.depth_m[i] >= kDepthMinM ? 1 : 0;
+    }
+    const float heard_m = sonar_reading_m(images, kSceneCamera);
+    if (t < 1.6) {
+      EXPECT_EQ(hand, 0u) << t;
+      EXPECT_GT(heard_m, 1.0f) << t;
+    }
+    if (t < 2.6) continue;  // on its way
+    EXPECT_GT(static_cast<double>(hand) / static_cast<double>(images.mask.size()), 0.15) << t;
+    EXPECT_EQ(measurable, 0u) << t;
+    EXPECT_NEAR(heard_m, 0.18f, 0.02f) << t;
+  }
+}
+
+TEST(Sonar, tells_the_nearest_in_its_cone) {
+  IdealImages images;
+  const Intrinsics k = kSceneCamera;
+  images.depth_m.assign(static_cast<size_t>(k.width * k.height), 6.0f);
+  EXPECT_EQ(sonar_reading_m(images, k), 0.0f) << "out of its range";
+  images.depth_m.assign(images.depth_m.size(), 2.0f);
+  EXPECT_NEAR(sonar_reading_m(images, k), 2.0f, 0.004f);
+  images.depth_m[static_cast<size_t>(k.width / 2 + k.width * (k.height / 2))] = 0.3f;
+  EXPECT_NEAR(sonar_reading_m(images, k), 0.303f, 0.004f) << "4 cm below its axis";
+  images.depth_m.assign(images.depth_m.size(), 2.0f);
+  images.depth_m[0] = 0.3f;
+  EXPECT_NEAR(sonar_reading_m(images, k), 2.0f, 0.004f) << "beside its cone";
+  images.depth_m.assign(images.depth_m.size(), 0.001f);
+  EXPECT_EQ(sonar_reading_m(images, k), 0.0f);
+}
 
 TEST(Scenes, fast_turns_about_6_degrees_a_frame_at_times) {
   const Pace pace = pace_of(scene_named("fast"));

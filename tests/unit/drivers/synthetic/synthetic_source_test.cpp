@@ -52,13 +52,13 @@ TEST(SyntheticSource, says_what_it_is) {
   EXPECT_FLOAT_EQ(vga.cy, 239.5f);
 }
 
-TEST(SyntheticSource, lists_the_twenty_scenes) {
+TEST(SyntheticSource, lists_its_scenes) {
   std::string names;
   for (const std::string& name : synthetic_scene_names()) names += name + " ";
   EXPECT_EQ(names,
             "static balloon balloon_tracking crowd crowd_start crowd_close moving_box obstructing_box "
             "placing_box removing_box placing_obstructing_box person_tracking synchronous kidnapping_box "
-            "loop fast covered camera_kidnapped long_loop corridor ");
+            "loop fast covered camera_kidnapped long_loop corridor hall near ");
 }
 
 TEST(SyntheticSource, a_covered_lens_measures_nothing_and_sees_dark) {

@@ -38,6 +38,23 @@ class ScriptedEngine : public Engine {
     integrate_pose = T;
     return {};
   }
+  uint32_t keep_frame(const Se3& T, const NearEcho& echo) override {
+    calls += 'k';
+    kept.push_back(T);
+    echoes.push_back(echo);
+    return kept_frames();
+  }
+  IntegrateResult integrate_kept(uint32_t index) override {
+    calls += 'o';
+    integrate_pose = kept.at(index);
+    mapped_x.push_back(integrate_pose.translation.x);
+    return {};
+  }
+  void forget_kept(uint32_t oldest) override {
+    kept.erase(kept.begin(), kept.begin() + oldest);
+    echoes.erase(echoes.begin(), echoes.begin() + oldest);
+  }
+  uint32_t kept_frames() const override { return static_cast<uint32_t>(kept.size()); }
   void remember_place(const Se3&) override { ++keyframes; }
   PlaceResult find_place(const Se3& T_guess, int32_t) override {
     calls += 'f';
@@ -72,7 +89,11 @@ class ScriptedEngine : public Engine {
     health.blocks = 77;
     return health;
   }
-  void reset_map() override { ++resets; }
+  void reset_map() override {
+    ++resets;
+    kept.clear();
+    echoes.clear();
+  }
 
   std::string calls;  ///< first letters, in order
   Status prepare_status = Status::ok;
@@ -83,6 +104,9 @@ class ScriptedEngine : public Engine {
   Se3 find_guess;
   float period_s = -1;  ///< told with the last frame
   Se3 track_start, mask_pose, refine_start, integrate_pose;
+  std::vector<Se3> kept;  ///< what waits to be completed
+  std::vector<NearEcho> echoes;
+  std::vector<float> mapped_x;  ///< of the poses of what was completed
 };
 
 Se3 at(float x, float y = 0) {
@@ -500,6 +524,108 @@ TEST_F(PipelineTest, WhenLessOfThePictureFitsTheLastPoseIsTriedAsWell) {
   process(pipeline, 160);
   EXPECT_EQ(engine_.calls, "pttmi");
   EXPECT_EQ(engine_.mask_pose.translation.x, 0.3f);
+}
+
+/// Frames wait for three more before they go into the map.
+class CompletionTest : public PipelineTest {
+ protected:
+  CompletionTest() {
+    config_.depth.invalid = InvalidDepth::complete;
+    config_.depth.complete_frames = 3;
+  }
+  /// At 33 ms each, frame i at x = i cm.
+  FrameResult process_frame(Pipeline& pipeline, int i, const FrameWork& work = {}) {
+    answer(at(0.01f * static_cast<float>(i)));
+    engine_.calls.clear();
+    RgbdFrame frame;
+    frame.depth_stamp = {i * int64_t{33000000}};
+    return pipeline.process(frame, work);
+  }
+};
+
+TEST_F(CompletionTest, TheFirstFrameIsMappedAtOnceTheOthersLate) {
+  Pipeline pipeline(engine_, config_);
+  FrameResult result = process_frame(pipeline, 0);
+  EXPECT_EQ(engine_.calls, "pi");
+  EXPECT_TRUE(result.integrated);
+  for (int i = 1; i <= 3; ++i) {
+    result = process_frame(pipeline, i);
+    EXPECT_EQ(engine_.calls.substr(engine_.calls.size() - 2), "mk") << i;
+    EXPECT_FALSE(result.integrated);
+    EXPECT_FLOAT_EQ(static_cast<float>(result.T_map_cam.translation.x), 0.01f * static_cast<float>(i));
+  }
+  result = process_frame(pipeline, 4);
+  EXPECT_EQ(engine_.calls, "ptmko") << "tracked, kept; the oldest is completed";
+  EXPECT_TRUE(result.integrated);
+  EXPECT_EQ(engine_.kept_frames(), 3u);
+  process_frame(pipeline, 5);
+  ASSERT_EQ(engine_.mapped_x.size(), 2u);
+  EXPECT_NEAR(engine_.mapped_x[0], 0.01f, 1e-6f);
+  EXPECT_NEAR(engine_.mapped_x[1], 0.02f, 1e-6f);
+}
+
+TEST_F(CompletionTest, AtTheEndAllThatWaitAreMapped) {
+  Pipeline pipeline(engine_, config_);
+  for (int i = 0; i < 6; ++i) process_frame(pipeline, i);
+  pipeline.finish();
+  ASSERT_EQ(engine_.mapped_x.size(), 5u);
+  for (size_t i = 0; i < 5; ++i) EXPECT_NEAR(engine_.mapped_x[i], 0.01 * static_cast<double>(i + 1), 1e-6);
+  EXPECT_EQ(engine_.kept_frames(), 0u);
+  pipeline.finish();
+  EXPECT_EQ(engine_.mapped_x.size(), 5u);
+  EXPECT_EQ(pipeline.counters().not_mapped, 0u);
+}
+
+TEST_F(CompletionTest, WhatIsNotMappedDoesNotWaitEither) {
+  Pipeline pipeline(engine_, config_);
+  for (int i = 0; i < 3; ++i) process_frame(pipeline, i);
+  EXPECT_EQ(engine_.kept_frames(), 2u);
+  process_frame(pipeline, 3, {.integrate = false});
+  EXPECT_EQ(engine_.kept_frames(), 2u) << "shed";
+  answer(at(0.03f), 0.35f);
+  engine_.calls.clear();
+  EXPECT_EQ(process(pipeline, 132).state, TrackingState::poor);
+  EXPECT_EQ(engine_.kept_frames(), 2u) << "poor";
+  engine_.prepare_status = Status::bad_data;
+  process(pipeline, 165);
+  EXPECT_EQ(engine_.kept_frames(), 2u) << "bad";
+}
+
+TEST_F(CompletionTest, ALossAndANewMapGiveThemUp) {
+  Pipeline pipeline(engine_, config_);
+  for (int i = 0; i < 3; ++i) process_frame(pipeline, i);
+  answer(at(5), 0.0f);
+  EXPECT_EQ(process(pipeline, 99).state, TrackingState::lost);
+  EXPECT_EQ(engine_.kept_frames(), 0u);
+  EXPECT_EQ(pipeline.counters().not_mapped, 2u);
+  pipeline.start_new_map();
+  EXPECT_EQ(pipeline.counters().not_mapped, 2u);
+  for (int i = 4; i < 7; ++i) process_frame(pipeline, i);
+  EXPECT_EQ(engine_.kept_frames(), 2u);
+  pipeline.start_new_map();
+  EXPECT_EQ(pipeline.counters().not_mapped, 4u);
+  EXPECT_TRUE(engine_.mapped_x.empty());
+}
+
+TEST_F(CompletionTest, AReadingNearerThanTheCameraSeesStaysWithItsFrame) {
+  config_.sonar.veto_m = 0.5f;
+  config_.sonar.beam_deg = 60;
+  config_.sonar.T_cam_sonar = {0.01f, -0.02f, 0.03f, 0, 0.70710678f, 0, 0.70710678f};  // looks along x
+  Pipeline pipeline(engine_, config_);
+  process_frame(pipeline, 0);
+  process_frame(pipeline, 1, {.sonar_m = 0.3f});
+  process_frame(pipeline, 2, {.sonar_m = 0.6f});
+  process_frame(pipeline, 3);
+  ASSERT_EQ(engine_.echoes.size(), 3u);
+  const NearEcho& echo = engine_.echoes[0];
+  EXPECT_EQ(echo.range_m, 0.3f);
+  EXPECT_EQ(echo.until_m, 0.5f);
+  EXPECT_NEAR(echo.cos_half_beam, std::cos(3.14159265f / 6), 1e-6f);
+  EXPECT_EQ(echo.place_cam.y, -0.02f);
+  EXPECT_NEAR(echo.axis_cam.x, 1.0f, 1e-6f);
+  EXPECT_NEAR(echo.axis_cam.z, 0.0f, 1e-6f);
+  EXPECT_EQ(engine_.echoes[1].range_m, 0.0f) << "as far as the camera sees";
+  EXPECT_EQ(engine_.echoes[2].range_m, 0.0f);
 }
 
 }  // namespace
