@@ -240,10 +240,10 @@ Findings check_openni2(const Machine& machine, const RunIntent& intent,
                                               camera.usb_product, camera.uri)));
   if (!found.empty() || !needed) return found;
   if (on_usb3(machine))
-    return {
-        wrong("openni2", "sees no camera, though one is plugged into a USB 3 controller",
-              "unplug it and plug it in again; Xtions with old firmware start on USB 2 only: put a USB 2 hub "
-              "between, or update the firmware")};
+    return {wrong(
+        "openni2", "sees no camera, though one is plugged into a USB 3 controller",
+        "unplug it and plug it in again; Xtions with old firmware may not start on USB 3: put a USB 2 hub "
+        "between, or update the firmware")};
   return {
       wrong("openni2", "sees no camera",
             "unplug it and plug it in again; is another program using it? sudo fuser -v /dev/bus/usb/*/*")};

@@ -57,7 +57,8 @@ class Case(unittest.TestCase):
                             "STILLMAP_VIRTUAL_CONTROL": str(self.camera.path)}
 
     def tool(self, *arguments):
-        subprocess.run([TOOL, *map(str, arguments)], check=True, env=self.environment, timeout=PATIENCE_S)
+        subprocess.run([TOOL, *map(str, arguments)], check=True, env=self.environment, timeout=PATIENCE_S,
+                       stdout=subprocess.DEVNULL)
 
     def stillmap(self, *arguments, environment=None):
         return subprocess.run([STILLMAP, *map(str, arguments)], capture_output=True, text=True, timeout=PATIENCE_S,

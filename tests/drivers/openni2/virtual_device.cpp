@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <condition_variable>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <memory>
@@ -299,6 +299,7 @@ class VirtualDriver : public oni::driver::DriverBase {
   OniStatus tryDevice(const char*) override { return ONI_STATUS_ERROR; }
   oni::driver::DeviceBase* deviceOpen(const char* uri, const char*) override {
     if (!control().plugged || std::strcmp(uri, info_.uri) != 0) return nullptr;
+    std::printf("a driver prints to stdout\n");  // as that of the Xtion does when it may not set a priority
     auto camera = std::make_unique<Camera>(std::getenv(kFramesVariable), control());
     return camera->usable() ? camera.release() : nullptr;
   }
