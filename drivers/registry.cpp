@@ -6,7 +6,6 @@
 #include "drivers/camera/calibrated_source.hpp"
 #include "drivers/dataset/sevenscenes_source.hpp"
 #include "drivers/dataset/tum_source.hpp"
-#include "drivers/openni2/openni2_source.hpp"
 #include "drivers/recording/log_source.hpp"
 #include "drivers/synthetic/synthetic_source.hpp"
 #include "drivers/v4l2/v4l2_source.hpp"
@@ -134,6 +133,14 @@ std::string schemes_of_this_build() {
 }
 
 }  // namespace
+
+Result<std::vector<OpenNi2Camera>> xtion_cameras() {
+#ifdef STILLMAP_OPENNI2
+  return openni2_cameras();
+#else
+  return Error{"this build has no OpenNI2", ErrorKind::bad_usage};
+#endif
+}
 
 bool is_camera(const std::string& source) {
   const std::string scheme = source.substr(0, source.find(':'));

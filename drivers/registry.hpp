@@ -2,10 +2,12 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "config/result.hpp"
 #include "drivers/camera/camera_options.hpp"
 #include "drivers/dataset/dataset_options.hpp"
+#include "drivers/openni2/openni2_source.hpp"
 #include "runtime/ports/frame_source.hpp"
 
 namespace stillmap {
@@ -18,6 +20,11 @@ struct SourceOptions {
 
 /// The source is a camera: frames come at their own pace.
 bool is_camera(const std::string& source);
+
+/// What the driver of `xtion` finds.
+/// @return kind bad_usage: this build has no such driver; kind cannot_open: its library does not start
+/// @thread boot
+Result<std::vector<OpenNi2Camera>> xtion_cameras();
 
 /// Makes the source that `source` names: `SCHEME:REST` as on the command line (--source).
 /// @return kind bad_usage: no such scheme, a part that this build lacks, unknown intrinsics, a wrong

@@ -1,7 +1,9 @@
 #include "drivers/openni2/library.hpp"
 
 #include <OpenNI.h>
+#include <unistd.h>
 
+#include <cstdio>
 #include <mutex>
 
 #include "drivers/openni2/openni2_source.hpp"
@@ -28,6 +30,7 @@ Result<Done> start_library() {
   static bool started = false;
   const std::lock_guard<std::mutex> lock(mutex);
   if (started) return Done{};
+  const StdoutAside aside;
   keep_log_quiet();
   if (::openni::OpenNI::initialize() != ::openni::STATUS_OK)
     return Error{"OpenNI2 does not start: " + library_error() + "; are its drivers installed (libopenni2-0)?",
@@ -36,6 +39,17 @@ Result<Done> start_library() {
   static const EndWithProgram end_with_program;
   started = true;
   return Done{};
+}
+
+StdoutAside::StdoutAside() : stdout_(::dup(STDOUT_FILENO)) {
+  std::fflush(stdout);
+  if (stdout_ >= 0) ::dup2(STDERR_FILENO, STDOUT_FILENO);
+}
+StdoutAside::~StdoutAside() {
+  if (stdout_ < 0) return;
+  std::fflush(stdout);
+  ::dup2(stdout_, STDOUT_FILENO);
+  ::close(stdout_);
 }
 
 std::string library_error() {

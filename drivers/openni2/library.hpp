@@ -12,6 +12,18 @@ namespace stillmap::openni2 {
 /// @thread boot or one reader; a later call answers as the first did, unless that failed
 Result<Done> start_library();
 
+/// While one lives, what is written to stdout goes to stderr: drivers of the library print there.
+class StdoutAside {
+ public:
+  StdoutAside();
+  ~StdoutAside();
+  StdoutAside(const StdoutAside&) = delete;
+  StdoutAside& operator=(const StdoutAside&) = delete;
+
+ private:
+  int stdout_;  ///< a descriptor; -1: none could be had
+};
+
 /// What the library says about the call of this thread that failed last, on one line.
 std::string library_error();
 

@@ -425,6 +425,7 @@ RgbdDevice::~RgbdDevice() = default;
 
 Result<std::unique_ptr<RgbdDevice>> RgbdDevice::open(const std::string& uri, Kind kind,
                                                      const CameraOptions& options) {
+  const StdoutAside aside;
   auto state = std::make_unique<State>(uri, kind, options);
   if (std::string wrong = state->open(); !wrong.empty()) return cannot_open(std::move(wrong));
   return std::unique_ptr<RgbdDevice>(new RgbdDevice(std::move(state)));
@@ -478,6 +479,7 @@ const std::string& RgbdDevice::error() const {
 Result<std::string> find_camera(const std::string& serial) {
   const auto cameras = openni2_cameras();
   if (!cameras) return Error{cameras.error(), cameras.error_kind()};
+  const StdoutAside aside;
   std::string seen;
   for (const OpenNi2Camera& camera : *cameras) {
     if (serial.empty()) return camera.uri;

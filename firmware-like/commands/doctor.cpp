@@ -7,6 +7,7 @@
 
 #include "config/engine_params.hpp"
 #include "drivers/gpio/gpio_sonar.hpp"
+#include "drivers/registry.hpp"
 #include "firmware-like/commands/command.hpp"
 #include "firmware-like/commands/common.hpp"
 #include "firmware-like/doctor/checks.hpp"
@@ -65,6 +66,9 @@ Findings examine(const DoctorOptions& o) {
   if (!gpio_library().empty()) machine.gpio_problem = sonar_line_problem;
   // First the camera, then whether it opens: the reason stands above the failure.
   for (Finding& finding : check_cameras(machine, intent)) found.push_back(std::move(finding));
+  if (o.source.empty() || is_camera(o.source))
+    for (Finding& finding : check_openni2(machine, intent, xtion_cameras()))
+      found.push_back(std::move(finding));
   if (!o.source.empty()) found.push_back(check_source(intent, info));
   intent.planned_bytes = planned_bytes(intent.config, info);
   for (Finding& finding : check_system(machine, intent)) found.push_back(std::move(finding));

@@ -126,7 +126,7 @@ std::string map_text(const std::string& path, const MapFile& file, const LoadedM
 
 /// Frames that will be read, -1 when nobody knows.
 int64_t expected_frames(const SourceInfo& info, const RunOptions& o) {
-  if (info.frames < 0) return o.max_frames > 0 ? o.max_frames : -1;
+  if (info.frames < 0) return o.max_frames > 0 ? int64_t{o.max_frames} : -1;
   const int64_t left = std::max<int64_t>(info.frames - o.skip_frames, 0);
   return o.max_frames > 0 ? std::min<int64_t>(left, o.max_frames) : left;
 }

@@ -137,6 +137,20 @@ Findings other_video_nodes(const Machine& machine, const std::vector<std::string
   return found;
 }
 
+bool is_xtion(const std::string& source) {
+  return source == "xtion" || source.starts_with("xtion:");
+}
+
+/// An Xtion hangs on a controller of USB 3, whatever the port's colour.
+bool on_usb3(const Machine& machine) {
+  for (const UsbDevice& device : primesense_devices(machine)) {
+    const std::string bus = machine.line(device.folder + "/busnum");
+    if (machine.line(std::string(kUsbDevices) + "/usb" + bus + "/product").find("xHCI") != std::string::npos)
+      return true;
+  }
+  return false;
+}
+
 Findings check_v4l2(const Machine& machine, const std::string& nodes) {
   Findings found;
   std::vector<std::string> asked;
@@ -234,7 +248,7 @@ bool is_jetson(const Machine& machine) {
 
 Findings check_cameras(const Machine& machine, const RunIntent& intent) {
   constexpr std::string_view kV4l2 = "v4l2:";
-  if (intent.source == "xtion" || intent.source.starts_with("xtion:")) return check_xtion(machine);
+  if (is_xtion(intent.source)) return check_xtion(machine);
   if (intent.source.starts_with(kV4l2)) return check_v4l2(machine, intent.source.substr(kV4l2.size()));
   if (intent.source.empty()) return other_video_nodes(machine, {});
   return {};
@@ -261,6 +275,31 @@ Findings check_sonar(const Machine& machine, const RunIntent& intent) {
       return without(problem);
   }
   return {ok("sonar", sonar.chip + ", its lines are free")};
+}
+
+Findings check_openni2(const Machine& machine, const RunIntent& intent,
+                       const Result<std::vector<OpenNi2Camera>>& cameras) {
+  const bool needed = is_xtion(intent.source);
+  if (!cameras) {
+    if (!needed) return {};
+    return {wrong("openni2", cameras.error(),
+                  cameras.error_kind() == ErrorKind::bad_usage
+                      ? "sudo apt-get install libopenni2-dev, then build again"
+                      : "sudo apt-get install --reinstall libopenni2-0")};
+  }
+  Findings found;
+  for (const OpenNi2Camera& camera : *cameras)
+    found.push_back(ok("openni2", fmt::format("sees {} ({:04x}:{:04x}) at {}", camera.name, camera.usb_vendor,
+                                              camera.usb_product, camera.uri)));
+  if (!found.empty() || !needed) return found;
+  if (on_usb3(machine))
+    return {wrong(
+        "openni2", "sees no camera, though one is plugged into a USB 3 controller",
+        "unplug it and plug it in again; Xtions with old firmware may not start on USB 3: put a USB 2 hub "
+        "between, or update the firmware")};
+  return {
+      wrong("openni2", "sees no camera",
+            "unplug it and plug it in again; is another program using it? sudo fuser -v /dev/bus/usb/*/*")};
 }
 
 Findings check_memory(const Machine& machine, const RunIntent& intent) {

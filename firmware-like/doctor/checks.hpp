@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "config/config.hpp"
+#include "config/result.hpp"
+#include "drivers/openni2/openni2_source.hpp"
 #include "firmware-like/doctor/machine.hpp"
 
 namespace stillmap {
@@ -38,6 +40,9 @@ struct RunIntent {
 Findings check_cameras(const Machine& machine, const RunIntent& intent);
 /// The lines of the sonar: there, free, and permitted. Nothing where there is none.
 Findings check_sonar(const Machine& machine, const RunIntent& intent);
+/// What OpenNI2 makes of them. Where no source was named, those that it finds and nothing else.
+Findings check_openni2(const Machine& machine, const RunIntent& intent,
+                       const Result<std::vector<OpenNi2Camera>>& cameras);
 /// Enough memory for the plan.
 Findings check_memory(const Machine& machine, const RunIntent& intent);
 /// Priorities and locked memory that the configuration asks for.

@@ -86,6 +86,11 @@ class Frames {
   size_t pixels() const { return static_cast<size_t>(header_.cols) * static_cast<size_t>(header_.rows); }
   size_t depth_bytes() const { return pixels() * 2; }
   size_t colour_bytes() const { return pixels() * 3; }
+  /// Where the camera is with its `sent`th moment: to the last image and back again, on and on.
+  int image_of(int sent) const {
+    const int way = header_.count - 1, there = way > 0 ? sent % (2 * way) : 0;
+    return there <= way ? there : 2 * way - there;
+  }
   const uint8_t* depth(int index) const {
     return static_cast<const uint8_t*>(file_.memory()) + sizeof header_ +
            static_cast<size_t>(index % header_.count) * frame_bytes();

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <condition_variable>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <memory>
@@ -53,14 +53,15 @@ class Stream : public oni::driver::StreamBase {
     return running_;
   }
 
+  /// @param moment counts on, also while nothing is sent
   /// @param small half the width
-  void send(int index, int64_t stamp_us, bool small) {
+  void send(int moment, int image, int64_t stamp_us, bool small) {
     const std::lock_guard lock(mutex_);
     if (!running_) return;
     OniFrame* const frame = getServices().acquireFrame();
     if (frame == nullptr) return;
     const bool depth = sensor_ == ONI_SENSOR_DEPTH;
-    frame->frameIndex = index + 1;
+    frame->frameIndex = moment + 1;
     frame->videoMode = mode_;
     frame->width = small ? mode_.resolutionX / 2 : mode_.resolutionX;
     frame->height = mode_.resolutionY;
@@ -70,7 +71,7 @@ class Stream : public oni::driver::StreamBase {
     frame->sensorType = sensor_;
     frame->timestamp = static_cast<uint64_t>(stamp_us);
     frame->dataSize = frame->stride * frame->height;
-    std::memcpy(frame->data, depth ? frames_.depth(index) : frames_.colour(index),
+    std::memcpy(frame->data, depth ? frames_.depth(image) : frames_.colour(image),
                 static_cast<size_t>(frame->dataSize));
     raiseNewFrame(frame);
     getServices().releaseFrame(frame);
@@ -231,7 +232,7 @@ class Camera : public oni::driver::DeviceBase {
  private:
   /// Both images of a moment, one after the other, as long as it is open.
   void send_all(const std::stop_token& stop) {
-    int index = 0;
+    int moment = 0, images = 0;
     auto due = Clock::now();
     while (!stop.stop_requested()) {
       const int rate = running_rate();
@@ -240,7 +241,7 @@ class Camera : public oni::driver::DeviceBase {
         due = Clock::now();
         continue;
       }
-      if (control_.unpaced && index == frames_.header().count) {
+      if (control_.unpaced && images == frames_.header().count) {
         std::this_thread::sleep_for(kPoll);
         continue;
       }
@@ -248,20 +249,20 @@ class Camera : public oni::driver::DeviceBase {
         due += microseconds(1'000'000 / rate);
         std::this_thread::sleep_until(due);
       }
-      if (!control_.stalled) send(index, rate);
-      ++index;
+      if (!control_.stalled) send(moment, frames_.image_of(images++), rate);
+      ++moment;
     }
   }
-  void send(int index, int rate) {
+  void send(int moment, int image, int rate) {
     const int64_t stamp_us =
-        (int64_t{index} * 1'000'000 + rate / 2) / rate + int64_t{control_.stamp_shift_ms} * 1000;
+        (int64_t{moment} * 1'000'000 + rate / 2) / rate + int64_t{control_.stamp_shift_ms} * 1000;
     const bool small = control_.small_images > 0;
     if (small) --control_.small_images;
     const std::lock_guard lock(mutex_);
-    if (depth_) depth_->send(index, stamp_us, small);
+    if (depth_) depth_->send(moment, image, stamp_us, small);
     ++control_.sent;
     if (colour_ && !control_.no_colour)
-      colour_->send(index, stamp_us + int64_t{control_.colour_shift_ms} * 1000, false);
+      colour_->send(moment, image, stamp_us + int64_t{control_.colour_shift_ms} * 1000, false);
   }
   /// 0 until both streams run.
   int running_rate() {
@@ -298,6 +299,7 @@ class VirtualDriver : public oni::driver::DriverBase {
   OniStatus tryDevice(const char*) override { return ONI_STATUS_ERROR; }
   oni::driver::DeviceBase* deviceOpen(const char* uri, const char*) override {
     if (!control().plugged || std::strcmp(uri, info_.uri) != 0) return nullptr;
+    std::printf("a driver prints to stdout\n");  // as that of the Xtion does when it may not set a priority
     auto camera = std::make_unique<Camera>(std::getenv(kFramesVariable), control());
     return camera->usable() ? camera.release() : nullptr;
   }

@@ -164,6 +164,44 @@ TEST_F(Doctor, OtherPrimeSenseDevice) {
   expect_only(Verdict::worse, "camera", "1d27:0609", "xtion");
 }
 
+/// What OpenNI2 finds, or why it cannot look.
+using OpenNi2Cameras = Result<std::vector<OpenNi2Camera>>;
+
+TEST_F(Doctor, CamerasThatOpenNi2Sees) {
+  const std::vector<OpenNi2Camera> cameras = {{"PrimeSense PS1080", "1d27/0601@3/14", 0x1d27, 0x0601}};
+  for (const char* source : {"xtion", "xtion:1234", ""}) {
+    intent.source = source;
+    const Findings found = check_openni2(machine, intent, cameras);
+    ASSERT_EQ(found.size(), 1u);
+    EXPECT_EQ(found[0].verdict, Verdict::ok);
+    EXPECT_EQ(found[0].text, "sees PrimeSense PS1080 (1d27:0601) at 1d27/0601@3/14");
+  }
+}
+
+TEST_F(Doctor, CameraThatOpenNi2DoesNotSee) {
+  Findings found = check_openni2(machine, intent, std::vector<OpenNi2Camera>());
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].verdict, Verdict::wrong);
+  EXPECT_NE(found[0].mend.find("another program"), std::string::npos) << found[0].mend;
+  write("/sys/bus/usb/devices/usb3/product", "xHCI Host Controller\n");
+  found = check_openni2(machine, intent, std::vector<OpenNi2Camera>());
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].verdict, Verdict::wrong);
+  EXPECT_NE(found[0].mend.find("USB 2 hub"), std::string::npos) << found[0].mend;
+  intent.source = "";
+  EXPECT_TRUE(check_openni2(machine, intent, std::vector<OpenNi2Camera>()).empty());
+}
+
+TEST_F(Doctor, OpenNi2ThatIsNotThere) {
+  const OpenNi2Cameras lacking = Error{"this build has no OpenNI2", ErrorKind::bad_usage};
+  const OpenNi2Cameras broken = Error{"OpenNI2 does not start", ErrorKind::cannot_open};
+  EXPECT_NE(check_openni2(machine, intent, lacking)[0].mend.find("libopenni2-dev"), std::string::npos);
+  EXPECT_NE(check_openni2(machine, intent, broken)[0].mend.find("libopenni2-0"), std::string::npos);
+  EXPECT_FALSE(would_run(check_openni2(machine, intent, broken)));
+  intent.source = "v4l2:/dev/video0";
+  EXPECT_TRUE(check_openni2(machine, intent, broken).empty());
+}
+
 TEST_F(Doctor, VideoNodes) {
   intent.source = "v4l2:/dev/video0,/dev/video1";
   write("/dev/video0", "");
