@@ -84,6 +84,10 @@ Finding check_usb_speed(const Machine& machine, const UsbDevice& device) {
   return ok("usb speed", fmt::format("{} Mbit/s, never put to sleep", speed));
 }
 
+bool is_xtion(const std::string& source) {
+  return source == "xtion" || source.starts_with("xtion:");
+}
+
 Findings check_xtion(const Machine& machine) {
   const std::vector<UsbDevice> devices = primesense_devices(machine);
   if (devices.empty())
@@ -143,7 +147,9 @@ Findings check_v4l2(const Machine& machine, const std::string& nodes) {
   std::istringstream in(nodes);
   for (std::string node; std::getline(in, node, ',');) {
     asked.push_back(node);
-    if (!machine.exists(node))
+    if (is_xtion(node))  // depth of an Xtion, colour of a video node
+      for (Finding& finding : check_xtion(machine)) found.push_back(std::move(finding));
+    else if (!machine.exists(node))
       found.push_back(wrong("camera", node + " is not there", "v4l2-ctl --list-devices"));
     else if (!machine.may_use(machine.root + node))
       found.push_back(wrong("camera", node + " cannot be opened by this user", kJoinVideo));
@@ -234,7 +240,7 @@ bool is_jetson(const Machine& machine) {
 
 Findings check_cameras(const Machine& machine, const RunIntent& intent) {
   constexpr std::string_view kV4l2 = "v4l2:";
-  if (intent.source == "xtion" || intent.source.starts_with("xtion:")) return check_xtion(machine);
+  if (is_xtion(intent.source)) return check_xtion(machine);
   if (intent.source.starts_with(kV4l2)) return check_v4l2(machine, intent.source.substr(kV4l2.size()));
   if (intent.source.empty()) return other_video_nodes(machine, {});
   return {};

@@ -49,8 +49,18 @@ TEST(Registry, UnknownSchemesListTheValidOnes) {
 }
 
 TEST(Registry, SchemesOfOtherBuildsSaySo) {
-  for (const char* source : {"xtion", "xtion:123", "oni:a.oni", "v4l2:/dev/video0"})
+  for (const char* source : {"xtion", "xtion:123", "oni:a.oni", "v4l2:xtion,/dev/video1"})
     expect_refused(source, ErrorKind::bad_usage, "is not part of this build");
+}
+
+TEST(Registry, VideoNodesThatAreNotThereCannotBeOpened) {
+  expect_refused("v4l2:/dev/video98", ErrorKind::bad_usage, "--camera");
+  SourceOptions options;
+  options.camera.camera = CameraModel{{525, 525, 319.5f, 239.5f, 0, 0}, {}};
+  const auto source = open_source("v4l2:/dev/video98,/dev/video99", options);
+  ASSERT_FALSE(source);
+  EXPECT_EQ(source.error_kind(), ErrorKind::cannot_open);
+  EXPECT_TRUE(contains(source.error(), "/dev/video98: No such file")) << source.error();
 }
 
 TEST(Registry, LogsThatAreNotThereCannotBeOpened) {
