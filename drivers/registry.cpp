@@ -9,6 +9,7 @@
 #include "drivers/recording/log_source.hpp"
 #include "drivers/synthetic/synthetic_source.hpp"
 #include "drivers/v4l2/v4l2_source.hpp"
+#include "drivers/v4l2/with_colour.hpp"
 
 namespace stillmap {
 namespace {
@@ -63,8 +64,18 @@ Opened oni(const std::string& path, const SourceOptions& options) {
 constexpr auto xtion = nullptr, oni = nullptr;
 #endif
 
+/// The depth may be another camera's: v4l2:xtion,/dev/video1.
 Opened v4l2(const std::string& nodes, const SourceOptions& options) {
-  return open_v4l2(nodes, options.camera);
+  const size_t comma = nodes.find(',');
+  const std::string depth_name = nodes.substr(0, comma);
+  if (comma == std::string::npos || !is_camera(depth_name)) return open_v4l2(nodes, options.camera);
+  SourceOptions of_depth = options;
+  of_depth.dataset.calibration.clear();  // it is for both cameras together
+  auto depth = open_source(depth_name, of_depth);
+  if (!depth) return depth;
+  auto both = WithColour::open(std::move(*depth), nodes.substr(comma + 1), options.camera);
+  if (!both) return Error{both.error(), both.error_kind()};
+  return std::unique_ptr<FrameSource>(std::move(*both));
 }
 
 constexpr Scheme kSchemes[] = {

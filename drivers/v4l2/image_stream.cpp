@@ -42,7 +42,6 @@ Status ImageStream::take(Image& image, bool in_trouble) {
       return Status::ok;
     }
     if (decoder_->submit({node_->image(buffer.index).data, buffer.bytes, buffer.index, stamp_ns})) continue;
-    ++not_decoded_;
     if (node_->give_back(buffer.index) != Status::ok) return Status::unavailable;
   }
   return Status::timeout;

@@ -45,8 +45,6 @@ class ImageStream {
 
   /// Images that the driver of the kernel lost because nobody took them in time, as it says.
   uint32_t lost() const { return lost_; }
-  /// Compressed images that came while too many were on their way.
-  uint32_t not_decoded() const { return not_decoded_; }
 
  private:
   static constexpr uint32_t kMostErrors = 10;  ///< one after the other, of which none is said to be the end
@@ -63,7 +61,7 @@ class ImageStream {
       decoder_;        ///< null: not compressed; goes before the node, whose memory it reads
   DeviceClock clock_;  ///< of nodes whose stamps are not CLOCK_MONOTONIC
   bool any_ = false;
-  uint32_t last_sequence_ = 0, lost_ = 0, not_decoded_ = 0;
+  uint32_t last_sequence_ = 0, lost_ = 0;
   uint32_t errors_ = 0;  ///< since the last image
 };
 

@@ -50,9 +50,10 @@ std::string apply_number(const std::string& flag, const std::string& text, doubl
 
 void declare_run_flags(CLI::App& command, RunOptions& o) {
   command
-      .add_option("--source", o.source,
-                  "xtion[:SERIAL], oni:FILE, tum:DIR, sevenscenes:DIR, log:FILE or "
-                  "synthetic:SCENE[,seed=N][,size=WxH][,seconds=S]")
+      .add_option(
+          "--source", o.source,
+          "xtion[:SERIAL], oni:FILE, v4l2:DEPTH_DEV[,COLOUR_DEV], tum:DIR, sevenscenes:DIR, log:FILE or "
+          "synthetic:SCENE[,seed=N][,size=WxH][,seconds=S]")
       ->required();
   command.add_option("--config", o.config, "TOML file (default: the built-in default preset)");
   command.add_option("--out", o.out, "folder for trajectory, mesh and report; without it nothing is written");

@@ -84,6 +84,10 @@ Finding check_usb_speed(const Machine& machine, const UsbDevice& device) {
   return ok("usb speed", fmt::format("{} Mbit/s, never put to sleep", speed));
 }
 
+bool is_xtion(const std::string& source) {
+  return source == "xtion" || source.starts_with("xtion:");
+}
+
 Findings check_xtion(const Machine& machine) {
   const std::vector<UsbDevice> devices = primesense_devices(machine);
   if (devices.empty())
@@ -157,7 +161,9 @@ Findings check_v4l2(const Machine& machine, const std::string& nodes) {
   std::istringstream in(nodes);
   for (std::string node; std::getline(in, node, ',');) {
     asked.push_back(node);
-    if (!machine.exists(node))
+    if (is_xtion(node))  // depth of an Xtion, colour of a video node
+      for (Finding& finding : check_xtion(machine)) found.push_back(std::move(finding));
+    else if (!machine.exists(node))
       found.push_back(wrong("camera", node + " is not there", "v4l2-ctl --list-devices"));
     else if (!machine.may_use(machine.root + node))
       found.push_back(wrong("camera", node + " cannot be opened by this user", kJoinVideo));

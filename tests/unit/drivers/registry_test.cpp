@@ -49,7 +49,22 @@ TEST(Registry, UnknownSchemesListTheValidOnes) {
 }
 
 TEST(Registry, SchemesOfOtherBuildsSaySo) {
-  expect_refused("v4l2:/dev/video0", ErrorKind::bad_usage, "is not part of this build");
+  const auto source = open_source("oni:/nowhere/a.oni", {});
+  ASSERT_FALSE(source);
+  if (source.error_kind() == ErrorKind::bad_usage)
+    EXPECT_TRUE(contains(source.error(), "is not part of this build")) << source.error();
+  else
+    EXPECT_TRUE(contains(source.error(), "/nowhere/a.oni")) << source.error();
+}
+
+TEST(Registry, VideoNodesThatAreNotThereCannotBeOpened) {
+  expect_refused("v4l2:/dev/video98", ErrorKind::bad_usage, "--camera");
+  SourceOptions options;
+  options.camera.camera = CameraModel{{525, 525, 319.5f, 239.5f, 0, 0}, {}};
+  const auto source = open_source("v4l2:/dev/video98,/dev/video99", options);
+  ASSERT_FALSE(source);
+  EXPECT_EQ(source.error_kind(), ErrorKind::cannot_open);
+  EXPECT_TRUE(contains(source.error(), "/dev/video98: No such file")) << source.error();
 }
 
 TEST(Registry, LogsThatAreNotThereCannotBeOpened) {

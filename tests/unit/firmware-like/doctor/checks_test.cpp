@@ -213,6 +213,14 @@ TEST_F(Doctor, VideoNodes) {
   expect_only(Verdict::wrong, "camera", "/dev/video1 is not there", "v4l2-ctl");
 }
 
+TEST_F(Doctor, DepthOfAnXtionWithTheColourOfAVideoNode) {
+  intent.source = "v4l2:xtion,/dev/video0";
+  write("/dev/video0", "");
+  EXPECT_TRUE(would_run(all())) << to_text(all());
+  remove(kUsb);
+  expect_only(Verdict::wrong, "camera", "no Xtion", "lsusb");
+}
+
 TEST_F(Doctor, VideoNodesToChooseFrom) {
   machine.video_node = [this](const std::string& path) {
     return path == machine.root + "/dev/video0" ? "a camera; depth Z16" : "";
