@@ -274,8 +274,11 @@ class Sources(Case):
         self.refused(2, *run, says=["my.toml"])
         calibration.write_text("focal = 3\n")
         self.refused(2, *run, says=["my.toml:1: focal: unknown key; did you mean"])
-        calibration.write_text("[colour]\nwidth = 640\nheight = 480\nfx = 525\nfy = 525\ncx = 320\ncy = 240\n")
+        vga = "[colour]\nwidth = 640\nheight = 480\nfx = 525\nfy = 525\ncx = {}\ncy = {}\n"
+        calibration.write_text(vga.format(80, 60))
         self.refused(2, *run, says=["is for 640x480 pixels", "160x120"])
+        calibration.write_text(vga.format(320, 240))
+        self.refused(2, *run, says=["my.toml: centre cx = 320.0, cy = 240.0 lies outside"])
         self.refused(2, "run", "--source", f"tum:{clip}", "--set", "camera.calibration=xtoin", says=["xtoin"])
 
         config = self.folder / "c.toml"

@@ -9,6 +9,7 @@ for folder in proc sys dev; do $box mount --move /$folder /host/$folder; done
 $box mount -t tmpfs tmp /host/run
 $box mkdir -p /host/dev/shm /host/run/modules /host/run/work
 $box mount -t tmpfs tmp /host/dev/shm
+$box ln -s /proc/self/fd /host/dev/fd
 $box mount --bind /modules /host/run/modules
 $box mount -t configfs none /host/sys/kernel/config 2>/dev/null
 $box mount -t debugfs none /host/sys/kernel/debug 2>/dev/null
