@@ -34,7 +34,8 @@ Complaint read_float(const toml::node& node, float& out) {
 
 /// Between `fewest` and N numbers; those that are left out stay as they are.
 template <size_t N>
-Complaint read_floats(const toml::node& node, size_t fewest, const char* expected, std::array<float, N>& out) {
+Complaint read_floats(const toml::node& node, size_t fewest, const char* expected,
+                      std::array<float, N>& out) {
   const toml::array* numbers = node.as_array();
   if (!numbers || numbers->size() < fewest || numbers->size() > N) return std::string("expected ") + expected;
   for (size_t i = 0; i < numbers->size(); ++i)
@@ -164,7 +165,8 @@ class Reader {
   void finish() {
     if (!problems_.empty()) return;
     if (alone_.said && colour_.said)
-      return of_file("fx and the like stand before the first heading and in [colour]: expected one of the two");
+      return of_file(
+          "fx and the like stand before the first heading and in [colour]: expected one of the two");
     const bool in_section = colour_.said;
     const Lens& colour = in_section ? colour_ : alone_;
     const bool alone = lenient() && colour.pinhole_keys == 0;  // the lens is known from elsewhere
@@ -222,7 +224,8 @@ std::string degrees_text(double radians) {
 
 /// Area of what becomes of a pixel: negative where the image is folded over.
 float area_after(const CameraModel& camera, Pixel p) {
-  const Pixel o = distort(camera, p), u = distort(camera, {p.u + 1, p.v}), v = distort(camera, {p.u, p.v + 1});
+  const Pixel o = distort(camera, p), u = distort(camera, {p.u + 1, p.v}),
+              v = distort(camera, {p.u, p.v + 1});
   return (u.u - o.u) * (v.v - o.v) - (u.v - o.v) * (v.u - o.u);
 }
 
@@ -251,7 +254,8 @@ std::vector<std::string> implausible_bias(const DepthBias& bias, const std::stri
   for (int step = 0; step <= kSteps; ++step) {
     const float m = depth.min_m + (depth.max_m - depth.min_m) * static_cast<float>(step) / kSteps;
     const float true_m = bias.corrected(m, depth.max_m);
-    const std::string found = file + ": depth_bias: makes " + float_text(m) + " m " + float_text(true_m) + " m; ";
+    const std::string found =
+        file + ": depth_bias: makes " + float_text(m) + " m " + float_text(true_m) + " m; ";
     if (!(std::abs(true_m - m) <= kMost * m)) return {found + "expected less than a tenth of it"};
     if (!(true_m > before)) return {found + "expected that farther stays farther"};
     before = true_m;
@@ -285,8 +289,9 @@ Result<std::string> find_calibration(const std::string& name) {
     if (fs::exists(path, error)) return path.string();
     tried += (tried.empty() ? "" : ", ") + path.string();
   }
-  return Error{"camera.calibration = \"" + name + "\": is none of " + tried + "; expected one of those or a file",
-               ErrorKind::bad_usage};
+  return Error{
+      "camera.calibration = \"" + name + "\": is none of " + tried + "; expected one of those or a file",
+      ErrorKind::bad_usage};
 }
 
 std::vector<std::string> implausible(const CameraModel& camera, const std::string& before) {
@@ -298,8 +303,8 @@ std::vector<std::string> implausible(const CameraModel& camera, const std::strin
     const auto size = static_cast<float>(pixels);
     const double angle = 2 * std::atan(static_cast<double>(size / (2 * f)));
     if (angle < kNarrowest || angle > kWidest)
-      lines.push_back(before + focal + " = " + float_text(f) + ": an angle of view of " + degrees_text(angle) +
-                      " degrees over the " + across + " of " + std::to_string(pixels) +
+      lines.push_back(before + focal + " = " + float_text(f) + ": an angle of view of " +
+                      degrees_text(angle) + " degrees over the " + across + " of " + std::to_string(pixels) +
                       " pixels; expected 20 to 120");
     if (c < 0.25f * size || c > 0.75f * size)
       lines.push_back(before + centre + " = " + float_text(c) + ": expected within the middle half, " +
@@ -321,7 +326,9 @@ std::vector<std::string> implausible(const CameraModel& camera, const std::strin
 std::vector<std::string> implausible(const Calibration& calibration, const std::string& file, int32_t cols,
                                      int32_t rows, const DepthParams& depth) {
   std::vector<std::string> lines;
-  const auto add = [&](std::vector<std::string> more) { lines.insert(lines.end(), more.begin(), more.end()); };
+  const auto add = [&](std::vector<std::string> more) {
+    lines.insert(lines.end(), more.begin(), more.end());
+  };
   if (calibration.colour) add(implausible(with_size(*calibration.colour, cols, rows), file + ": colour."));
   if (calibration.depth) {
     const DepthCamera& camera = *calibration.depth;

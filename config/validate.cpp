@@ -72,9 +72,8 @@ void check_camera(const CameraConfig& camera, Violations& out) {
 void check_pose(const char* name, const std::array<float, 7>& T, Violations& out) {
   constexpr float kRounding = 0.01f;
   const float length = std::sqrt(T[3] * T[3] + T[4] * T[4] + T[5] * T[5] + T[6] * T[6]);
-  out.unless(
-      std::abs(length - 1.0f) <= kRounding,
-      std::string(name) + ": the length of the quaternion is " + float_text(length) + ", must be 1");
+  out.unless(std::abs(length - 1.0f) <= kRounding,
+             std::string(name) + ": the length of the quaternion is " + float_text(length) + ", must be 1");
 }
 
 /// Rules between the keys of the sonar. With kind none they have no effect, but for who waits for a stop.
@@ -94,18 +93,17 @@ void check_sonar(const SonarConfig& sonar, Violations& out) {
              line("trigger_line", sonar.trigger_line) +
                  (triggers ? ": sonar.kind = hc_sr04 needs a trigger line"
                            : ": has no effect with sonar.kind = pulse_width; set -1"));
-  const std::pair<const char*, int32_t> lines[] = {{"trigger_line", sonar.trigger_line},
-                                                   {"echo_line", sonar.echo_line},
-                                                   {"stop_line", sonar.stop_line}};
+  const std::pair<const char*, int32_t> lines[] = {
+      {"trigger_line", sonar.trigger_line}, {"echo_line", sonar.echo_line}, {"stop_line", sonar.stop_line}};
   for (size_t i = 0; i < std::size(lines); ++i)
     for (size_t j = 0; j < i; ++j)
       out.unless(lines[i].second < 0 || lines[i].second != lines[j].second,
                  line(lines[i].first, lines[i].second) + ": is sonar." + lines[j].first + " as well");
   out.unless(sonar.min_m < sonar.max_m, setting("sonar.min_m", sonar.min_m) +
                                             ": must be below sonar.max_m = " + float_text(sonar.max_m));
-  out.unless(sonar.stop_m <= sonar.max_m,
-             setting("sonar.stop_m", sonar.stop_m) +
-                 ": must be at most sonar.max_m = " + float_text(sonar.max_m) + ", or it is never free to go");
+  out.unless(sonar.stop_m <= sonar.max_m, setting("sonar.stop_m", sonar.stop_m) +
+                                              ": must be at most sonar.max_m = " + float_text(sonar.max_m) +
+                                              ", or it is never free to go");
   out.unless(sonar.stop_line < 0 || sonar.stop_m > sonar.min_m,
              setting("sonar.stop_m", sonar.stop_m) + ": must be above sonar.min_m = " +
                  float_text(sonar.min_m) + ", or sonar.stop_line never says stop");
@@ -114,9 +112,9 @@ void check_sonar(const SonarConfig& sonar, Violations& out) {
              setting("sonar.rate_hz", sonar.rate_hz) + ": allowed below " +
                  float_text(kSlowestSound_m_s / (2 * sonar.max_m)) +
                  ", or an echo from sonar.max_m comes after the next trigger");
-  out.unless(sonar.lost_s * sonar.rate_hz >= 2, setting("sonar.lost_s", sonar.lost_s) +
-                                                    ": must be at least twice 1 / sonar.rate_hz = " +
-                                                    float_text(2 / sonar.rate_hz));
+  out.unless(sonar.lost_s * sonar.rate_hz >= 2,
+             setting("sonar.lost_s", sonar.lost_s) +
+                 ": must be at least twice 1 / sonar.rate_hz = " + float_text(2 / sonar.rate_hz));
   out.unless(sonar.max_age_s * sonar.rate_hz >= 0.5f,
              setting("sonar.max_age_s", sonar.max_age_s) + ": must be at least half of 1 / sonar.rate_hz = " +
                  float_text(0.5f / sonar.rate_hz) + ", or there are frames that no reading speaks for");

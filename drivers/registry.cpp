@@ -94,6 +94,7 @@ Result<Calibration> read_calibration(SourceOptions& options) {
   if (!file) return Error{file.error(), file.error_kind()};
   auto calibration = load_calibration(*file);
   if (!calibration) return Error{calibration.error(), calibration.error_kind()};
+  if (!options.dataset.camera) options.dataset.camera_origin = *file;
   const auto fill = [&](auto& said) {
     if (!said.camera) said.camera = calibration->colour;
     if (said.depth_units_per_m == 0) said.depth_units_per_m = calibration->depth_units_per_m;

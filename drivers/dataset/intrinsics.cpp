@@ -66,7 +66,7 @@ Result<DatasetCamera> first_found(const std::string& dir, const DatasetOptions& 
                                   const CameraDefaults& defaults, const Calibration& file) {
   const std::filesystem::path folder(dir);
   const std::string matrix = (folder / "camera-intrinsics.txt").string();
-  if (options.camera) return DatasetCamera{*options.camera, 0, "--camera"};
+  if (options.camera) return DatasetCamera{*options.camera, 0, options.camera_origin};
   if (file.colour) return DatasetCamera{*file.colour, 0, (folder / "camera.toml").string()};
   if (is_there(matrix)) {
     const Result<CameraModel> model = read_matrix(matrix);

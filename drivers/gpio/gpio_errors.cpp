@@ -8,8 +8,9 @@ namespace stillmap {
 std::string gpio_chip_error(const std::string& chip, int error) {
   const std::string said = "sonar.chip = \"" + chip + "\": ";
   if (error == EACCES || error == EPERM)
-    return said + "not permitted; sudo usermod -aG gpio $USER (and log in again), with the rule of "
-                  "60-stillmap.rules in /etc/udev/rules.d";
+    return said +
+           "not permitted; sudo usermod -aG gpio $USER (and log in again), with the rule of "
+           "60-stillmap.rules in /etc/udev/rules.d";
   if (error == ENOENT || error == ENODEV || error == ENXIO)
     return said + "there is no such GPIO chip; gpiodetect lists those that are";
   if (error == ENOTTY || error == EINVAL) return said + "is no GPIO chip; gpiodetect lists those that are";

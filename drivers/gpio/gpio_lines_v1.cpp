@@ -29,9 +29,7 @@ class Lines final : public GpioLines {
     const auto output = [](bool high) {
       return [high](gpiod_line* line) { return gpiod_line_request_output(line, kConsumer, high ? 1 : 0); };
     };
-    const auto input = [](gpiod_line* line) {
-      return gpiod_line_request_both_edges_events(line, kConsumer);
-    };
+    const auto input = [](gpiod_line* line) { return gpiod_line_request_both_edges_events(line, kConsumer); };
     // The stop line first: from the first moment on it says stop.
     std::string problem = take(sonar.chip, sonar.stop_line, stop_, output(true));
     if (problem.empty()) problem = take(sonar.chip, sonar.trigger_line, trigger_, output(false));

@@ -19,9 +19,9 @@ Result<Done> check_plausible(const Config& config) {
   };
   const CameraConfig& c = config.camera;
   if (c.fx > 0)
-    add(implausible({{c.fx, c.fy, c.cx, c.cy, config.source.cols, config.source.rows},
-                     {c.k1, c.k2, c.p1, c.p2, c.k3}},
-                    "camera."));
+    add(implausible(
+        {{c.fx, c.fy, c.cx, c.cy, config.source.cols, config.source.rows}, {c.k1, c.k2, c.p1, c.p2, c.k3}},
+        "camera."));
   if (!c.calibration.empty()) {
     const auto file = find_calibration(c.calibration);
     if (!file) return Error{file.error(), file.error_kind()};

@@ -147,8 +147,8 @@ int replay(const std::string& log, const std::string& out, bool quiet) {
   const auto config = config_of(source, log, out);
   if (!config) return fail(config.error(), config.error_kind());
 
-  const EngineParams params = engine_params(*config, source.info().camera, source.info().depth_units_per_m,
-                                            source.info().depth_bias);
+  const EngineParams params =
+      engine_params(*config, source.info().camera, source.info().depth_units_per_m, source.info().depth_bias);
   const MemoryPlan memory = plan_memory(*config, params);
   if (const auto fits = check_budget(memory); !fits) return fail(fits.error(), fits.error_kind());
   const std::unique_ptr<Engine> engine = make_cpu_engine(params);

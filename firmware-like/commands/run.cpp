@@ -215,8 +215,8 @@ SessionMessage session_of(const FrameSource& source, const RunPlan& plan, const 
 int run_with(FrameSource& source, const RunOptions& o, const RunPlan& plan, std::optional<MapFile>& map,
              Lcm& lcm, UtcClock& clock, ServiceManager* service, FrameObserver* observer) {
   const Config& config = plan.config;
-  EngineParams params = engine_params(config, source.info().camera, source.info().depth_units_per_m,
-                                      source.info().depth_bias);
+  EngineParams params =
+      engine_params(config, source.info().camera, source.info().depth_units_per_m, source.info().depth_bias);
   params.on_worker = heap_guard::arm_worker;
   const std::string device = pick_device(o.device, o.quiet);
   const MemoryPlan memory = plan_memory(config, params, device);

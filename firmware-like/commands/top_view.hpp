@@ -16,8 +16,8 @@ struct TopView {
   std::optional<PoseMessage> pose;
   std::optional<RangeMessage> range;
   double status_age_s = 0, pose_age_s = 0, range_age_s = 0;  ///< since the last one came
-  double poses_per_s = 0;                   ///< of late
-  uint32_t foreign = 0;                     ///< messages on our channels that are none of ours
+  double poses_per_s = 0;                                    ///< of late
+  uint32_t foreign = 0;  ///< messages on our channels that are none of ours
 };
 
 /// After this time without a status there is nothing to be heard.

@@ -14,7 +14,7 @@ namespace {
 
 constexpr int64_t kMillisecond_ns = 1'000'000;
 constexpr int64_t kWait_ns = 50 * kMillisecond_ns;  ///< how long a stop may go unseen
-constexpr uint32_t kMostEdges = 64;  ///< within kWait_ns, of a line without noise some four
+constexpr uint32_t kMostEdges = 64;                 ///< within kWait_ns, of a line without noise some four
 constexpr std::chrono::milliseconds kRest{1};
 constexpr int64_t kFirstWait_ns = 500 * kMillisecond_ns, kLongestWait_ns = 10'000 * kMillisecond_ns;
 
@@ -42,7 +42,8 @@ void RangeStage::run() {
     else
       std::this_thread::sleep_for(std::chrono::nanoseconds(kWait_ns));
   }
-  if (is_open_ && !line_high_) sensor_.set_stop(true);  // when it is refused the lines are gone, and with them the level
+  if (is_open_ && !line_high_)
+    sensor_.set_stop(true);  // when it is refused the lines are gone, and with them the level
 }
 
 void RangeStage::open() {
@@ -54,7 +55,8 @@ void RangeStage::open() {
   if (was_gone_) ranger_.reopened(now);
 }
 
-/// The first time it is opened again at once, then less and less often. The reason is told once until edges come again.
+/// The first time it is opened again at once, then less and less often. The reason is told once until edges
+/// come again.
 void RangeStage::give_up_for_a_while(Stamp now) {
   is_open_ = false;
   open_at_ns_ = now.ns + next_wait_ns_;
@@ -63,8 +65,7 @@ void RangeStage::give_up_for_a_while(Stamp now) {
   was_gone_ = true;
   if (std::exchange(told_, true)) return;
   const Stamp frame{state_.last_stamp_ns.load(std::memory_order_relaxed)};
-  queues_.notices.push(
-      Notice::make(Notice::Kind::fault, frame, name_of(Fault::range_lost), sensor_.error()));
+  queues_.notices.push(Notice::make(Notice::Kind::fault, frame, name_of(Fault::range_lost), sensor_.error()));
 }
 
 void RangeStage::work() {

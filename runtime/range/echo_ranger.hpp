@@ -13,7 +13,8 @@ namespace stillmap {
 float speed_of_sound(float temperature_c);
 
 /// From the edges of an echo line to readings, and to what is wrong with the sonar. Knows no clock and no
-/// line: it is told what happened when (CLOCK_MONOTONIC), in rising order.              test: echo_ranger_test
+/// line: it is told what happened when (CLOCK_MONOTONIC), in rising order.              test:
+/// echo_ranger_test
 ///
 /// hc_sr04: a trigger, then the line is high for as long as the sound was on its way there and back.
 /// pulse_width: the line is high for sonar.pulse_us_per_m a metre, whenever the sensor likes; what the sensor
@@ -45,7 +46,8 @@ class EchoRanger {
   /// Something is nearer than sonar.stop_m. One echo is enough to say so, believed or not; it takes a valid
   /// reading, and an echo, from farther away to take it back: what comes too near is not heard any more.
   bool stop() const { return stop_; }
-  /// The level of the stop line: low only while a valid reading that is not too old says that nothing is near.
+  /// The level of the stop line: low only while a valid reading that is not too old says that nothing is
+  /// near.
   bool stop_line(Stamp now) const { return stop_ || !any_valid_ || lost(now) || stuck(now); }
 
   /// Edges and pulses that cannot be of the sensor.
@@ -62,13 +64,13 @@ class EchoRanger {
   const float m_per_ns_;  ///< of a pulse
   const int64_t period_ns_, answer_ns_, lost_ns_, stuck_ns_;
   RangeFilter filter_;
-  Stamp asked_;           ///< hc_sr04: the last trigger; else the last pulse or silence
-  bool waiting_ = false;  ///< for the pulse that comes after that
+  Stamp asked_;                         ///< hc_sr04: the last trigger; else the last pulse or silence
+  bool waiting_ = false;                ///< for the pulse that comes after that
   std::optional<Stamp> rose_;           ///< the line is high since
   std::optional<Stamp> waiting_since_;  ///< for an edge
   Stamp heard_;                         ///< the last valid reading, or when it was opened
-  bool any_valid_ = false;  ///< since then
-  bool gone_ = false;       ///< opened again, and no valid reading came
+  bool any_valid_ = false;              ///< since then
+  bool gone_ = false;                   ///< opened again, and no valid reading came
   bool stop_ = false;
   uint32_t spurious_ = 0;
 };

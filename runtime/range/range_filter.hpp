@@ -10,11 +10,13 @@
 namespace stillmap {
 
 /// Believes an echo when it lies where the last one can have moved to, or when the next one says the same
-/// again: one alone that jumps is noise. What is believed goes through a median.        test: range_filter_test
+/// again: one alone that jumps is noise. What is believed goes through a median.        test:
+/// range_filter_test
 /// @thread one; neither waits nor allocates
 class RangeFilter {
  public:
-  static constexpr float kFastest_m_s = 10;  ///< that anything comes nearer or goes, the robot's own way included
+  static constexpr float kFastest_m_s =
+      10;  ///< that anything comes nearer or goes, the robot's own way included
   static constexpr float kRounding_m = 0.05f;  ///< of two readings of one thing
   static constexpr int32_t kMostMedian = 15;
 

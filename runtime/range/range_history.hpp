@@ -8,7 +8,8 @@
 
 namespace stillmap {
 
-/// The last valid readings of the sonar: what it saw when a frame was taken.           test: range_history_test
+/// The last valid readings of the sonar: what it saw when a frame was taken.           test:
+/// range_history_test
 /// @thread one; neither waits nor allocates
 class RangeHistory {
  public:

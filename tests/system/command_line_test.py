@@ -240,6 +240,57 @@ class Sources(Case):
             (clip / name).write_text("# nothing\n")
         self.refused(3, "run", "--source", f"tum:{clip}", "--camera", "131,131,80,60")
 
+    def test_calibration_files(self):
+        clip = self.folder / "clip"
+        done = stillmap("render", "--source", SMALL, "--out", clip)
+        self.assertEqual(done.returncode, 0, done.stderr)
+
+        def trajectory(*settings, log=False):
+            kept = ["--set", "record.log=true", "--set", "record.frames=true"] if log else []
+            self.mapped("--source", f"tum:{clip}", "--out", self.out, "--max-frames", 12, *settings, *kept)
+            return (self.out / "trajectory.txt").read_bytes()
+
+        plain = trajectory()
+        lens = (clip / "camera.toml").read_text()
+        calibration = self.folder / "my.toml"
+        use = ["--set", f"camera.calibration={calibration}"]
+        calibration.write_text(lens)
+        self.assertEqual(trajectory(*use), plain, "the same camera")
+        # A bias changes the poses; a replay takes out the same one, also when the file is there no more.
+        calibration.write_text("depth_bias = [0.0, 1.05]\n" + lens)
+        biased = trajectory(*use, log=True)
+        self.assertNotEqual(biased, plain)
+        calibration.unlink()
+        done = stillmap("replay", self.out, "--out", self.folder / "again")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual((self.folder / "again/trajectory.txt").read_bytes(), biased)
+        (clip / "camera.toml").write_text("depth_bias = [0.0, 1.05]\n" + lens)
+        self.assertEqual(trajectory(), biased, "camera.toml is read by the same code")
+
+        run = ["run", "--source", f"tum:{clip}", "--quiet", *use]
+        self.refused(2, *run, says=["my.toml"])
+        calibration.write_text("focal = 3\n")
+        self.refused(2, *run, says=["my.toml:1: focal: unknown key; did you mean"])
+        vga = "[colour]\nwidth = 640\nheight = 480\nfx = 525\nfy = 525\ncx = {}\ncy = {}\n"
+        calibration.write_text(vga.format(80, 60))
+        self.refused(2, *run, says=["is for 640x480 pixels", "160x120"])
+        calibration.write_text(vga.format(320, 240))
+        self.refused(2, *run, says=["my.toml: centre cx = 320.0, cy = 240.0 lies outside"])
+        self.refused(2, "run", "--source", f"tum:{clip}", "--set", "camera.calibration=xtoin", says=["xtoin"])
+
+        config = self.folder / "c.toml"
+        config.write_text('[camera]\ncalibration = "xtion"\n')
+        self.assertEqual(stillmap("check-config", config).returncode, 0)
+        config.write_text(f'[camera]\ncalibration = "{calibration}"\n')
+        self.assertEqual(stillmap("check-config", config).returncode, 0)
+        calibration.write_text("depth_bias = [0.0, 1.2]\n[colour]\nfx = 100\nfy = 525\ncx = 320\ncy = 10\n")
+        self.refused(2, "check-config", config,
+                     says=["my.toml: colour.fx = 100.0", "expected 20 to 120", "colour.cy = 10.0", "depth_bias"])
+        calibration.write_text("[color]\n")
+        self.refused(2, "check-config", config, says=["my.toml:1: color: unknown key; did you mean colour?"])
+        config.write_text("[camera]\nfx = 5000\nfy = 525\ncx = 320\ncy = 240\n")
+        self.refused(2, "check-config", config, says=["camera.fx = 5000.0", "7 degrees"])
+
     def test_render_refuses(self):
         self.refused(2, "render", "--source", "tum:x", "--out", self.out, says=["synthetic"])
         self.refused(1, "render", "--source", SMALL, "--out", "/proc/no", says=["/proc/no"])

@@ -172,7 +172,7 @@ TEST(SonarOnGpioSim, MeasuresWhatTheEchoSays) {
       EXPECT_LE(reading.range_m, metres(width_us + 400));
       EXPECT_EQ(reading.stop, reading.range_m < 0.25f);
     }
-    EXPECT_GE(valid + 1, readings.size());
+    EXPECT_GE(4 * valid, 3 * readings.size()) << "the one that answers may miss a trigger";
     std::printf("echo of %ld us: %zu readings, %zu valid, %.4f to %.4f m\n", static_cast<long>(width_us),
                 readings.size(), valid, static_cast<double>(least), static_cast<double>(most));
     EXPECT_FALSE(sonar.holds(Fault::range_lost));
@@ -242,7 +242,8 @@ TEST(SonarOnGpioSim, NoiseIsNoReadingAndEndsNothing) {
     const Wire echo(g_sysfs, 1, "pull", O_WRONLY);
     for (int i = 0; i < 2000; ++i) echo.pull(i % 2 == 0);  // far above what the kernel keeps
   }
-  EXPECT_TRUE(sonar.within(2 * kSecond, [&] { return stop_level() == 0 && !sonar.holds(Fault::range_lost); }));
+  EXPECT_TRUE(
+      sonar.within(2 * kSecond, [&] { return stop_level() == 0 && !sonar.holds(Fault::range_lost); }));
   sonar.listen(100 * kMs);
   for (const RangeReading& reading : sonar.listen(500 * kMs)) {
     EXPECT_TRUE(reading.valid);
@@ -254,7 +255,7 @@ TEST(SonarOnGpioSim, WhatIsWrongWithALineIsSaid) {
   EXPECT_EQ(sonar_line_problem(g_chip, 1), "");
   EXPECT_TRUE(test::contains(sonar_line_problem(g_chip, 9), "has the lines 0 to 2, not 9"));
   EXPECT_TRUE(test::contains(sonar_line_problem("/dev/gpiochip77", 1), "no such GPIO chip"));
-  EXPECT_TRUE(test::contains(sonar_line_problem("/dev/null", 1), "is no GPIO chip"));
+  EXPECT_TRUE(test::contains(sonar_line_problem("/dev/null", 1), "GPIO chip; gpiodetect"));
   auto first = std::move(*make_gpio_sonar(hc_sr04()));
   ASSERT_EQ(first->open(), Status::ok) << first->error();
   EXPECT_TRUE(test::contains(sonar_line_problem(g_chip, 1), "in use by \"stillmap sonar\""));
@@ -279,9 +280,12 @@ TEST(SonarOnGpioSim, AChipThatIsPulledOutComesBack) {
   ASSERT_TRUE(sonar.queues.notices.pop_within(notice, std::chrono::milliseconds(2000)));
   std::printf("said: %s\n", notice.text);
   EXPECT_TRUE(test::contains(notice.text, "the GPIO lines are gone")) << notice.text;
-  ASSERT_EQ(std::system(("bash -c 'source " + g_gpio_sim + "; gpio_sim_make sonar TRIGGER ECHO STOP'").c_str()), 0);
+  ASSERT_EQ(
+      std::system(("bash -c 'source " + g_gpio_sim + "; gpio_sim_make sonar TRIGGER ECHO STOP'").c_str()), 0);
   Echoes echoes(g_sysfs, 5800);
-  EXPECT_TRUE(sonar.within(5 * kSecond, [&] { return !sonar.holds(Fault::range_lost) && stop_level() == 0; }));
+  // It is looked for every ten seconds at least.
+  EXPECT_TRUE(
+      sonar.within(12 * kSecond, [&] { return !sonar.holds(Fault::range_lost) && stop_level() == 0; }));
 }
 
 int echo_only(char** arguments) {

@@ -15,7 +15,8 @@ constexpr const char* kWhole =
     "depth_scale = 1000.0\ndepth_bias = [0.001, 0.99, 0.002]\n"
     "[colour]\nwidth = 640\nheight = 480\nfx = 500\nfy = 501.5\ncx = 320.0\ncy = 240\n"
     "distortion = [0.1, -0.2, 0, 0.001, 0.3]\n"
-    "[depth]\nfx = 570\nfy = 571\ncx = 319\ncy = 239\nT_colour_depth = [-0.025, 0.001, 0.002, 0, 0, 0.1, 0.995]\n";
+    "[depth]\nfx = 570\nfy = 571\ncx = 319\ncy = 239\nT_colour_depth = [-0.025, 0.001, 0.002, 0, 0, 0.1, "
+    "0.995]\n";
 
 std::string refused(const std::string& text, OtherKeys others = OtherKeys::refused) {
   const Result<Calibration> calibration = parse_calibration(text, "my.toml", others);
@@ -97,7 +98,8 @@ TEST(Calibration, EveryKindOfBadFileIsRefusedWithKeyAndWhatWasExpected) {
       {"fx = 9\nfy = 9\ncx = 9\ncy = 9\n[colour]\nfx = 9\nfy = 9\ncx = 9\ncy = 9", "one of the two"},
       {"[depth]\nfx = 9\nfy = 9\ncx = 9\ncy = 9", "depth: expected fx, fy, cx, cy and T_colour_depth"},
       {"[depth]\nT_colour_depth = [0, 0, 0, 0, 0, 0, 1]", "depth: expected fx, fy, cx, cy and T_colour"},
-      {"[depth]\nfx = 9\nfy = 9\ncx = 9\ncy = 9\nT_colour_depth = [0, 0, 0, 0, 0, 0, 1]", "of [colour] as well"},
+      {"[depth]\nfx = 9\nfy = 9\ncx = 9\ncy = 9\nT_colour_depth = [0, 0, 0, 0, 0, 0, 1]",
+       "of [colour] as well"},
       {"[depth]\nT_colour_depth = [0, 0, 0]", "depth.T_colour_depth: expected [x, y, z"},
       {"[depth]\nT_colour_depth = [0, 0, 0, 0, 0, 0, 2]", "unit quaternion of length 1"},
       {"T_colour_depth = [0, 0, 0, 0, 0, 0, 1]", "T_colour_depth: unknown key"},
@@ -196,9 +198,13 @@ TEST(Implausible, EachReasonIsGivenWithFileKeyValueAndExpectation) {
   expect_one(spoilt([](Calibration& c) { c.colour->k.cx = 159; }),
              "my.toml: colour.cx = 159.0: expected within the middle half, 160.0 to 480.0");
   expect_one(spoilt([](Calibration& c) { c.depth->model.k.cy = 361; }), "depth.cy = 361.0");
-  expect_one(spoilt([](Calibration& c) { c.colour->distortion = {-0.9f, 0, 0, 0, 0}; }),
+  expect_one(spoilt([](Calibration& c) {
+               c.colour->distortion = {-0.9f, 0, 0, 0, 0};
+             }),
              "colour.distortion = [-0.9, 0.0, 0.0, 0.0, 0.0]: folds the image over");
-  expect_one(spoilt([](Calibration& c) { c.depth->T_colour_depth.translation = {0.4, 0.3, 0.01}; }),
+  expect_one(spoilt([](Calibration& c) {
+               c.depth->T_colour_depth.translation = {0.4, 0.3, 0.01};
+             }),
              "depth.T_colour_depth: the cameras are 0.50");
   expect_one(spoilt([](Calibration& c) { c.depth_bias = {{0.0f, 1.11f, 0, 0}}; }), "depth_bias: makes");
   expect_one(spoilt([](Calibration& c) { c.depth_bias = {{0.05f, 1, 0, 0}}; }), "expected less than a tenth");

@@ -114,7 +114,8 @@ TEST(Validate, TheSonarFitsTogether) {
   only(sonar_after([](SonarConfig& s) { s.stop_m = 5; }), "sonar.stop_m = 5.0");
   only(sonar_after([](SonarConfig& s) { s.stop_line = 7, s.stop_m = 0.01f; }), "never says stop");
   only(sonar_after([](SonarConfig& s) { s.max_m = 12; }), "allowed below 12.5");
-  only(sonar_after([](SonarConfig& s) { s.rate_hz = 1, s.lost_s = 1, s.max_age_s = 1; }), "sonar.lost_s = 1.0");
+  only(sonar_after([](SonarConfig& s) { s.rate_hz = 1, s.lost_s = 1, s.max_age_s = 1; }),
+       "sonar.lost_s = 1.0");
   only(sonar_after([](SonarConfig& s) { s.rate_hz = 1.5f; }), "sonar.max_age_s = 0.25");
   only(sonar_after([](SonarConfig& s) { s.T_cam_sonar[6] = 2; }), "sonar.T_cam_sonar");
   only(after([](Config& c) { c.sonar.stop_line = 7; }), "no effect while sonar.kind is none");

@@ -142,7 +142,8 @@ TEST_P(OnGrid, TheBiasOfTheDepthIsTakenOutAlike) {
     EnginePair biased(params, GetParam());
     plain.prepare(0);
     biased.prepare(0);
-    const auto a = biased.cpu->depth_image_m(), b = biased.gpu().depth_image_m(), raw = plain.cpu->depth_image_m();
+    const auto a = biased.cpu->depth_image_m(), b = biased.gpu().depth_image_m(),
+               raw = plain.cpu->depth_image_m();
     int32_t valid = 0;
     for (int32_t r = 0; r < a.rows; ++r)
       for (int32_t c = 0; c < a.cols; ++c) {

@@ -35,7 +35,8 @@ Depth registered(const Depth& raw, const DepthCamera& depth, const CameraModel& 
 TEST(DepthRegistration, OfOneAndTheSameCameraIsTheSameImage) {
   Depth raw = test::depth_pattern(kRows, kCols, 3);
   for (int32_t r = 0; r < kRows; ++r)
-    for (int32_t c = 0; c < kCols; ++c) raw.view().at(r, c) = static_cast<uint16_t>(raw.view().at(r, c) | 256);
+    for (int32_t c = 0; c < kCols; ++c)
+      raw.view().at(r, c) = static_cast<uint16_t>(raw.view().at(r, c) | 256);
   raw.view().at(5, 6) = 0;
   raw.view().at(5, 7) = 65535;
   const Depth out = registered(raw, {camera(), {}}, camera());
@@ -46,7 +47,8 @@ TEST(DepthRegistration, OfOneAndTheSameCameraIsTheSameImage) {
     }
 }
 
-// A wall at 2 m, the depth camera 10 cm to the left: it moves by f b / z = 3 pixels, and a strip stays unknown.
+// A wall at 2 m, the depth camera 10 cm to the left: it moves by f b / z = 3 pixels, and a strip stays
+// unknown.
 TEST(DepthRegistration, AWallMovesByTheDisparity) {
   DepthCamera depth{camera(), {}};
   depth.T_colour_depth.translation = {-0.1, 0, 0};
@@ -86,7 +88,8 @@ TEST(DepthRegistration, TheNearestStays) {
   }
 }
 
-// A longer lens sees the same with more pixels: no holes, all of the wall; a shorter one leaves the rim empty.
+// A longer lens sees the same with more pixels: no holes, all of the wall; a shorter one leaves the rim
+// empty.
 TEST(DepthRegistration, OtherFocalLengthsLeaveNoHoles) {
   const Depth larger = registered(filled(kMetre), {camera(60), {}}, camera(87));
   for (int32_t r = 0; r < kRows; ++r)
@@ -135,8 +138,9 @@ TEST(DepthRegistration, GoesThroughBothLenses) {
   const Pixel ideal = {10, 8};
   const Pixel seen = distort(bent, ideal);
   const Depth moved = registered(one, {camera(), {}}, bent);
-  EXPECT_EQ(moved.view().at(static_cast<int32_t>(std::lround(seen.v)), static_cast<int32_t>(std::lround(seen.u))),
-            kMetre);
+  EXPECT_EQ(
+      moved.view().at(static_cast<int32_t>(std::lround(seen.v)), static_cast<int32_t>(std::lround(seen.u))),
+      kMetre);
 }
 
 TEST(DepthRegistration, WhatLiesBehindOrTooFarIsLeftOut) {

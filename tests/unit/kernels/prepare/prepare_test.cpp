@@ -27,7 +27,7 @@ TEST(DepthBias, IsTakenOutBeforeTheRangeIsLookedAt) {
   EXPECT_FALSE(bias.none());
   EXPECT_TRUE(DepthBias{}.none());
   const auto polynomial = [](float m) { return 0.01f + 1.02f * m - 0.004f * m * m + 0.001f * m * m * m; };
-  for (const uint16_t raw : {500, 1000, 2500, 4000})
+  for (const uint16_t raw : std::initializer_list<uint16_t>{500, 1000, 2500, 4000})
     EXPECT_FLOAT_EQ(metres_from_raw(raw, 0.001f, 0.1f, bias, 4.0f), polynomial(0.001f * raw));
   EXPECT_EQ(metres_from_raw(0, 0.001f, 0.1f, bias, 4.0f), 0.0f) << "not the offset";
   EXPECT_EQ(metres_from_raw(65535, 0.001f, 0.1f, bias, 4.0f), 0.0f);

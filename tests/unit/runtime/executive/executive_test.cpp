@@ -463,8 +463,8 @@ class WithASonar : public Executives {
 };
 
 TEST_F(WithASonar, AReadingReachesTheFrameTheNetworkAndTheLog) {
-  run("crowd,size=80x60,seconds=2", true);
-  EXPECT_GE(ear.range_count, 20u);
+  run("crowd,size=80x60,seconds=1", true);
+  EXPECT_GE(ear.range_count, 10u);
   EXPECT_GE(notebook.ranges.size(), ear.range_count - 1);
   EXPECT_NEAR(ear.ranges[5].message.range_m, 1.0, 1e-3);
   EXPECT_TRUE(ear.ranges[5].message.valid);
@@ -492,12 +492,12 @@ TEST_F(WithASonar, WithoutASonarAFrameIsToldNothing) {
 
 // Far, then suddenly near: the line and the message do not wait for the median, nor for a frame.
 TEST_F(WithASonar, WhatIsTooNearStopsAtOnce) {
-  fake.echoes_m = std::vector<float>(15, 2.0f);
+  fake.echoes_m = std::vector<float>(8, 2.0f);
   fake.echoes_m.push_back(0.2f);
-  run("crowd,size=80x60,seconds=2", true);
+  run("crowd,size=80x60,seconds=1", true);
   const auto* first = std::find_if(ear.ranges.begin(), ear.ranges.begin() + ear.range_count,
                                    [](const Ear::SentRange& sent) { return sent.message.stop; });
-  ASSERT_EQ(first - ear.ranges.begin(), 15);
+  ASSERT_EQ(first - ear.ranges.begin(), 8);
   EXPECT_EQ(fake.to_go, 1u);
   EXPECT_EQ(fake.to_stop, 2u) << "when it was opened, and then; it is high when the program ends";
   const int64_t sound_ns = clock.to_monotonic_ns(first->message.utime.us);
@@ -507,10 +507,10 @@ TEST_F(WithASonar, WhatIsTooNearStopsAtOnce) {
 }
 
 TEST_F(WithASonar, NoEchoIsLostAndAnEchoBringsItBack) {
-  fake.echoes_m = std::vector<float>(10, 1.0f);
-  fake.echoes_m.insert(fake.echoes_m.end(), 12, 6.0f);  // beyond sonar.max_m
+  fake.echoes_m = std::vector<float>(4, 1.0f);
+  fake.echoes_m.insert(fake.echoes_m.end(), 9, 6.0f);  // beyond sonar.max_m
   fake.echoes_m.push_back(1.0f);
-  run("crowd,size=80x60,seconds=2", true);
+  run("crowd,size=80x60,seconds=1", true);
   EXPECT_EQ(state.faults.entry(Fault::range_lost).count, 1u);
   EXPECT_FALSE(holds(Fault::range_lost));
   EXPECT_FALSE(held(Fault::range_stuck));
@@ -521,24 +521,24 @@ TEST_F(WithASonar, NoEchoIsLostAndAnEchoBringsItBack) {
 
 TEST_F(WithASonar, ALineThatDoesNotMoveIsStuck) {
   fake.echoes_m = {1.0f, 1.0f, 1.0f, FakeSonar::kNoAnswer};
-  run("crowd,size=80x60,seconds=2", true);
+  run("crowd,size=80x60,seconds=1", true);
   EXPECT_TRUE(holds(Fault::range_stuck));
   EXPECT_TRUE(holds(Fault::range_lost));
   EXPECT_TRUE(fake.stop_line);
-  EXPECT_EQ(notebook.items.size() + state.frames_dropped, 60u) << "frames go on";
+  EXPECT_EQ(notebook.items.size() + state.frames_dropped, 30u) << "frames go on";
 }
 
 TEST_F(WithASonar, AChipThatIsPulledOutComesBack) {
   fake.echoes_m = {1.0f, 1.0f, FakeSonar::kGone, 1.0f};
   fake.gone_ns = 300'000'000;
-  run("crowd,size=80x60,seconds=2", true);
+  run("crowd,size=80x60,seconds=1", true);
   EXPECT_EQ(fake.opened, 3u) << "at boot, at once, and half a second later";
   EXPECT_EQ(state.faults.entry(Fault::range_lost).count, 1u);
   EXPECT_FALSE(holds(Fault::range_lost));
   EXPECT_EQ(std::count_if(notebook.notices.begin(), notebook.notices.end(),
                           [](const std::string& n) { return n == "range_lost: the chip was pulled out"; }),
             1);
-  EXPECT_GT(fake.triggers, 10u);
+  EXPECT_GT(fake.triggers, 5u);
 }
 
 TEST_F(WithASonar, OneThatIsNeverThereEndsNothing) {

@@ -128,7 +128,8 @@ TEST(EchoRanger, AsksAtTheRateAndNotBeforeTheAnswerIsOver) {
   Bench bench(hc_sr04());
   bench.wait_until(kStart + 2 * kSecond - 1);
   EXPECT_EQ(bench.triggers, 40);
-  // 20 ms after the trigger the line rises and stays high for 200 ms, as that of some sensors without an echo.
+  // 20 ms after the trigger the line rises and stays high for 200 ms, as that of some sensors without an
+  // echo.
   Bench slow(hc_sr04());
   slow.wait_until(kStart + 20 * kMs);
   EXPECT_EQ(slow.triggers, 1);

@@ -21,7 +21,8 @@ std::vector<float> filtered(const SonarConfig& sonar, const std::vector<float>& 
   RangeFilter filter(sonar);
   std::vector<float> out;
   int64_t now_ns = 5'000'000'000;
-  for (const float range_m : ranges_m) out.push_back(filter.add({now_ns += kPeriod_ns}, range_m).value_or(kNone));
+  for (const float range_m : ranges_m)
+    out.push_back(filter.add({now_ns += kPeriod_ns}, range_m).value_or(kNone));
   return out;
 }
 
@@ -32,8 +33,7 @@ TEST(RangeFilter, IsAMedianOfTheLast) {
 }
 
 TEST(RangeFilter, OfTwoInTheMiddleTheNearerCounts) {
-  EXPECT_EQ(filtered(with_median(4), {1.0f, 1.3f, 1.1f, 1.2f}),
-            (std::vector<float>{1.0f, 1.0f, 1.1f, 1.1f}));
+  EXPECT_EQ(filtered(with_median(4), {1.0f, 1.3f, 1.1f, 1.2f}), (std::vector<float>{1.0f, 1.0f, 1.1f, 1.1f}));
 }
 
 TEST(RangeFilter, OneThatJumpsIsNotBelievedAndLeavesNoTrace) {
@@ -53,7 +53,8 @@ TEST(RangeFilter, TwoThatJumpToDifferentPlacesAreNoise) {
 
 // What is nearer than it can have come in the time is refused, what is at the limit is not.
 TEST(RangeFilter, BelievesWhatCanHaveComeSoFar) {
-  const float reach_m = RangeFilter::kFastest_m_s * static_cast<float>(kPeriod_ns) * 1e-9f + RangeFilter::kRounding_m;
+  const float reach_m =
+      RangeFilter::kFastest_m_s * static_cast<float>(kPeriod_ns) * 1e-9f + RangeFilter::kRounding_m;
   EXPECT_EQ(filtered(with_median(1), {2.0f, 2.0f - 0.99f * reach_m})[1], 2.0f - 0.99f * reach_m);
   EXPECT_EQ(filtered(with_median(1), {2.0f, 2.0f - 1.01f * reach_m})[1], kNone);
 }
