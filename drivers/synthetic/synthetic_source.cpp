@@ -119,6 +119,11 @@ std::vector<std::string> synthetic_scene_names() {
   return names;
 }
 
+bool synthetic_scene_wants_completion(const std::string& name) {
+  const synthetic::Scene* const scene = synthetic::find_scene(name);
+  return scene != nullptr && scene->sonar;
+}
+
 bool synthetic_scene_moves(const std::string& name) {
   const synthetic::Scene* const scene = synthetic::find_scene(name);
   return scene != nullptr && scene->dynamic;

@@ -32,4 +32,8 @@ std::vector<std::string> synthetic_scene_names();
 /// Something moves in this scene, so that its "-static" twin is another one. False for names of no scene.
 bool synthetic_scene_moves(const std::string& name);
 
+/// Much of this scene cannot be measured, so that movers stay in its map unless depth.invalid = complete; its
+/// frames come with a reading of a sonar. False for names of no scene.
+bool synthetic_scene_wants_completion(const std::string& name);
+
 }  // namespace stillmap

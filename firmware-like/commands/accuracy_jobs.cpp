@@ -110,7 +110,7 @@ std::vector<Subject> subjects(const BenchOptions& o) {
   std::vector<std::string> sources = o.sources;
   if (sources.empty())
     for (const std::string& scene : synthetic_scene_names())
-      sources.push_back(std::string(kSynthetic) + scene);
+      if (!synthetic_scene_wants_completion(scene)) sources.push_back(std::string(kSynthetic) + scene);
   const bool twins = o.twins || o.sources.empty();
   std::vector<Subject> all;
   for (const std::string& source : sources) {

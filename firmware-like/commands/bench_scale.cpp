@@ -70,7 +70,8 @@ struct Row {
 void time_frames(Engine& engine, const Config& config, const PreloadedFrames& slots, Row& row) {
   Pipeline pipeline(engine, config);
   for (size_t frame = 0; frame < slots.size() && !stop_requested(); ++frame) {
-    const FrameResult result = pipeline.process(slots[frame]->frame(), {.sonar_m = slots[frame]->frame().sonar_m});
+    const FrameResult result =
+        pipeline.process(slots[frame]->frame(), {.sonar_m = slots[frame]->frame().sonar_m});
     if (frame == 0) continue;  // it only starts the map
     row.total_ms.add(static_cast<double>(result.ms.total_ms));
     row.integrate_ms.add(static_cast<double>(result.ms.integrate_ms));

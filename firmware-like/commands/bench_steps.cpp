@@ -74,7 +74,8 @@ int bench_steps(const BenchOptions& o) {
   Pipeline pipeline(*engine, *config);
   Histograms times;
   for (size_t frame = 0; frame < slots.size() && !stop_requested(); ++frame) {
-    const FrameResult result = pipeline.process(slots[frame]->frame(), {.sonar_m = slots[frame]->frame().sonar_m});
+    const FrameResult result =
+        pipeline.process(slots[frame]->frame(), {.sonar_m = slots[frame]->frame().sonar_m});
     if (frame == 0) continue;  // it only starts the map
     for (size_t i = 0; i < kStepCount; ++i) times[i].add(static_cast<double>(result.ms.*kSteps[i].ms));
   }

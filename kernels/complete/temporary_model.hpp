@@ -44,11 +44,11 @@ struct TemporaryModel {
   float truncation_m = 0;
   int32_t cell_px = 1;
   int32_t cell_rows = 0, cell_cols = 0;
-  View<uint32_t> start;  ///< frame by frame, row-major: bits of a depth in metres; kNoStart
+  View<uint32_t> start;  ///< cells row-major, for each its frames: bits of a depth in metres; kNoStart
 
   static constexpr uint32_t kNoStart = 0xffffffffu;
   STILLMAP_HD uint32_t& start_at(int32_t i, int32_t row, int32_t col) const {
-    return start[static_cast<uint32_t>((i * cell_rows + row) * cell_cols + col)];
+    return start[static_cast<uint32_t>((row * cell_cols + col) * frames + i)];
   }
   /// The pixel that stands for a cell.
   STILLMAP_HD int32_t middle_row(int32_t cell) const {
@@ -112,7 +112,8 @@ struct SilentCellPass {
   NearEcho echo;                   ///< of the target
 
   STILLMAP_HD void operator()(int32_t row, int32_t col) const {
-    const bool narrow = gap_to(row, col, 1) + gap_to(row, col, -1) <= kNarrowCells;
+    const int32_t right = gap_to(row, col, 1);
+    const bool narrow = right <= kNarrowCells && right + gap_to(row, col, -1) <= kNarrowCells;
     silent.at(row, col) = narrow || (echo.range_m > 0.0f && reaches_echo(row, col)) ? 1 : 0;
   }
 

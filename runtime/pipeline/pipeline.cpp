@@ -70,6 +70,7 @@ void Pipeline::start_lost(const Se3d& T_map_cam_guess) {
   T_map_cam_ = T_map_cam_guess;
   predictor_.restart(stamp_, T_map_cam_guess);
   have_map_ = lost_ = true;
+  mapped_at_once_ = UINT32_MAX;  // the map is not young
 }
 
 void Pipeline::start_new_map() {
@@ -80,6 +81,7 @@ void Pipeline::start_new_map() {
   predictor_.restart(stamp_, T_map_cam_);
   explained_ = 0;
   have_map_ = lost_ = false;
+  mapped_at_once_ = 0;
   lost_since_.reset();
   ++counters_.new_maps;
 }
@@ -128,15 +130,19 @@ void Pipeline::note(const IntegrateResult& integrated) {
 
 void Pipeline::integrate(const Se3& T_map_cam, FrameResult& result) {
   note(engine_.integrate(T_map_cam));
+  ++mapped_at_once_;
   result.integrated = true;
 }
 
 /// A registered frame into the map; when its depth is to be completed (paper III-E), it waits for
-/// depth.complete_frames more and the one that has waited so long goes into the map.
+/// depth.complete_frames more and the one that has waited so long goes into the map. The first ones do not
+/// wait and are mapped as they were measured, so that there is something to track against.
 void Pipeline::map(const Se3& T_map_cam, FrameResult& result) {
-  if (config_.depth.invalid == InvalidDepth::ignore) return integrate(T_map_cam, result);
+  const auto young_frames = static_cast<uint32_t>(config_.depth.complete_frames);
+  if (config_.depth.invalid == InvalidDepth::ignore || mapped_at_once_ < young_frames)
+    return integrate(T_map_cam, result);
   const uint32_t kept = engine_.keep_frame(T_map_cam, near_echo(config_.sonar, work_.sonar_m));
-  if (kept <= static_cast<uint32_t>(config_.depth.complete_frames)) return;
+  if (kept <= young_frames) return;
   note(engine_.integrate_kept(0));
   engine_.forget_kept(1);
   result.integrated = true;

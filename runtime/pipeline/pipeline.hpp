@@ -132,6 +132,7 @@ class Pipeline {
   Stamp stamp_;                  ///< of the last usable frame
   int64_t frame_period_ns_ = 0;  ///< shortest between two usable frames, 0: not known yet
   double mean_period_s_ = 0;     ///< of late, between usable frames; 0: not known yet
+  uint32_t mapped_at_once_ = 0;  ///< frames of this map that did not wait to be completed
   bool have_map_ = false;
   bool lost_ = false;
   std::optional<Stamp> lost_since_;

@@ -526,7 +526,7 @@ TEST_F(PipelineTest, WhenLessOfThePictureFitsTheLastPoseIsTriedAsWell) {
   EXPECT_EQ(engine_.mask_pose.translation.x, 0.3f);
 }
 
-/// Frames wait for three more before they go into the map.
+/// The first three frames are mapped at once, later ones wait for three more.
 class CompletionTest : public PipelineTest {
  protected:
   CompletionTest() {
@@ -543,64 +543,73 @@ class CompletionTest : public PipelineTest {
   }
 };
 
-TEST_F(CompletionTest, TheFirstFrameIsMappedAtOnceTheOthersLate) {
+TEST_F(CompletionTest, TheFirstFramesAreMappedAtOnceTheOthersLate) {
   Pipeline pipeline(engine_, config_);
-  FrameResult result = process_frame(pipeline, 0);
+  EXPECT_TRUE(process_frame(pipeline, 0).integrated);
   EXPECT_EQ(engine_.calls, "pi");
-  EXPECT_TRUE(result.integrated);
-  for (int i = 1; i <= 3; ++i) {
-    result = process_frame(pipeline, i);
-    EXPECT_EQ(engine_.calls.substr(engine_.calls.size() - 2), "mk") << i;
+  for (int i = 1; i < 3; ++i) {
+    EXPECT_TRUE(process_frame(pipeline, i).integrated);
+    EXPECT_EQ(engine_.calls, "ptmi") << i;
+  }
+  for (int i = 3; i < 6; ++i) {
+    const FrameResult result = process_frame(pipeline, i);
+    EXPECT_EQ(engine_.calls, "ptmk") << i;
     EXPECT_FALSE(result.integrated);
     EXPECT_FLOAT_EQ(static_cast<float>(result.T_map_cam.translation.x), 0.01f * static_cast<float>(i));
   }
-  result = process_frame(pipeline, 4);
+  EXPECT_TRUE(process_frame(pipeline, 6).integrated);
   EXPECT_EQ(engine_.calls, "ptmko") << "tracked, kept; the oldest is completed";
-  EXPECT_TRUE(result.integrated);
   EXPECT_EQ(engine_.kept_frames(), 3u);
-  process_frame(pipeline, 5);
+  process_frame(pipeline, 7);
   ASSERT_EQ(engine_.mapped_x.size(), 2u);
-  EXPECT_NEAR(engine_.mapped_x[0], 0.01f, 1e-6f);
-  EXPECT_NEAR(engine_.mapped_x[1], 0.02f, 1e-6f);
+  EXPECT_NEAR(engine_.mapped_x[0], 0.03f, 1e-6f);
+  EXPECT_NEAR(engine_.mapped_x[1], 0.04f, 1e-6f);
 }
 
 TEST_F(CompletionTest, AtTheEndAllThatWaitAreMapped) {
   Pipeline pipeline(engine_, config_);
-  for (int i = 0; i < 6; ++i) process_frame(pipeline, i);
+  for (int i = 0; i < 8; ++i) process_frame(pipeline, i);
   pipeline.finish();
   ASSERT_EQ(engine_.mapped_x.size(), 5u);
-  for (size_t i = 0; i < 5; ++i) EXPECT_NEAR(engine_.mapped_x[i], 0.01 * static_cast<double>(i + 1), 1e-6);
+  for (size_t i = 0; i < 5; ++i) EXPECT_NEAR(engine_.mapped_x[i], 0.01 * static_cast<double>(i + 3), 1e-6);
   EXPECT_EQ(engine_.kept_frames(), 0u);
   pipeline.finish();
   EXPECT_EQ(engine_.mapped_x.size(), 5u);
   EXPECT_EQ(pipeline.counters().not_mapped, 0u);
 }
 
+TEST_F(CompletionTest, InAMapThatWasThereAllWait) {
+  config_.relocalise.enabled = false;
+  Pipeline pipeline(engine_, config_);
+  pipeline.start_lost(cast<double>(at(0)));
+  process_frame(pipeline, 0);
+  EXPECT_EQ(engine_.calls.back(), 'k');
+}
+
 TEST_F(CompletionTest, WhatIsNotMappedDoesNotWaitEither) {
   Pipeline pipeline(engine_, config_);
-  for (int i = 0; i < 3; ++i) process_frame(pipeline, i);
+  for (int i = 0; i < 5; ++i) process_frame(pipeline, i);
   EXPECT_EQ(engine_.kept_frames(), 2u);
-  process_frame(pipeline, 3, {.integrate = false});
+  process_frame(pipeline, 5, {.integrate = false});
   EXPECT_EQ(engine_.kept_frames(), 2u) << "shed";
-  answer(at(0.03f), 0.35f);
-  engine_.calls.clear();
-  EXPECT_EQ(process(pipeline, 132).state, TrackingState::poor);
+  answer(at(0.05f), 0.35f);
+  EXPECT_EQ(process(pipeline, 198).state, TrackingState::poor);
   EXPECT_EQ(engine_.kept_frames(), 2u) << "poor";
   engine_.prepare_status = Status::bad_data;
-  process(pipeline, 165);
+  process(pipeline, 231);
   EXPECT_EQ(engine_.kept_frames(), 2u) << "bad";
 }
 
 TEST_F(CompletionTest, ALossAndANewMapGiveThemUp) {
   Pipeline pipeline(engine_, config_);
-  for (int i = 0; i < 3; ++i) process_frame(pipeline, i);
+  for (int i = 0; i < 5; ++i) process_frame(pipeline, i);
   answer(at(5), 0.0f);
-  EXPECT_EQ(process(pipeline, 99).state, TrackingState::lost);
+  EXPECT_EQ(process(pipeline, 165).state, TrackingState::lost);
   EXPECT_EQ(engine_.kept_frames(), 0u);
   EXPECT_EQ(pipeline.counters().not_mapped, 2u);
   pipeline.start_new_map();
   EXPECT_EQ(pipeline.counters().not_mapped, 2u);
-  for (int i = 4; i < 7; ++i) process_frame(pipeline, i);
+  for (int i = 6; i < 11; ++i) process_frame(pipeline, i);
   EXPECT_EQ(engine_.kept_frames(), 2u);
   pipeline.start_new_map();
   EXPECT_EQ(pipeline.counters().not_mapped, 4u);
@@ -612,10 +621,10 @@ TEST_F(CompletionTest, AReadingNearerThanTheCameraSeesStaysWithItsFrame) {
   config_.sonar.beam_deg = 60;
   config_.sonar.T_cam_sonar = {0.01f, -0.02f, 0.03f, 0, 0.70710678f, 0, 0.70710678f};  // looks along x
   Pipeline pipeline(engine_, config_);
-  process_frame(pipeline, 0);
-  process_frame(pipeline, 1, {.sonar_m = 0.3f});
-  process_frame(pipeline, 2, {.sonar_m = 0.6f});
-  process_frame(pipeline, 3);
+  for (int i = 0; i < 3; ++i) process_frame(pipeline, i);
+  process_frame(pipeline, 3, {.sonar_m = 0.3f});
+  process_frame(pipeline, 4, {.sonar_m = 0.6f});
+  process_frame(pipeline, 5);
   ASSERT_EQ(engine_.echoes.size(), 3u);
   const NearEcho& echo = engine_.echoes[0];
   EXPECT_EQ(echo.range_m, 0.3f);
