@@ -141,10 +141,6 @@ Findings other_video_nodes(const Machine& machine, const std::vector<std::string
   return found;
 }
 
-bool is_xtion(const std::string& source) {
-  return source == "xtion" || source.starts_with("xtion:");
-}
-
 /// An Xtion hangs on a controller of USB 3, whatever the port's colour.
 bool on_usb3(const Machine& machine) {
   for (const UsbDevice& device : primesense_devices(machine)) {
