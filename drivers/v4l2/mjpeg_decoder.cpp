@@ -50,8 +50,10 @@ bool MjpegDecoder::submit(const Job& job) {
 }
 
 bool MjpegDecoder::take(Decoded& decoded) {
+  // An event comes behind its image, which so is there; `pop` may fail all the same while the next one is put in.
+  constexpr std::chrono::milliseconds kMost{100};
   uint64_t one = 0;
-  if (::read(event_, &one, sizeof(one)) < 0 || !done_.pop(decoded)) return false;
+  if (::read(event_, &one, sizeof(one)) < 0 || !done_.pop_within(decoded, kMost)) return false;
   --on_their_way_;
   return true;
 }
