@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <vector>
+
 #include "tests/support/contains.hpp"
 #include "tests/support/frame_memory.hpp"
 #include "tests/support/tiny_dataset.hpp"
@@ -32,6 +34,54 @@ TEST(Registry, OpensRecordings) {
     test::FrameMemory buffer((*source)->info());
     EXPECT_EQ((*source)->next(buffer.frame, 0), Status::ok) << (*source)->error();
   }
+}
+
+/// Bytes of the depth image of the first frame.
+std::vector<uint16_t> first_depth(FrameSource& source) {
+  test::FrameMemory buffer(source.info());
+  EXPECT_EQ(source.next(buffer.frame, 0), Status::ok) << source.error();
+  const ImageView<uint16_t>& depth = buffer.frame.depth_raw;
+  std::vector<uint16_t> raw;
+  for (int32_t r = 0; r < depth.rows; ++r) raw.insert(raw.end(), depth.row(r), depth.row(r) + depth.cols);
+  return raw;
+}
+
+TEST(Registry, CalibrationsReachTheSource) {
+  const test::TempDir dir;
+  test::write_tum_images(dir, 1);
+  test::write_text(dir / "associated.txt", "1.0 depth/0.png 1.0 rgb/0.png\n");
+  const std::string lens = "fx = 20.0\nfy = 21.0\ncx = 8.0\ncy = 6.0\n";
+  // Without another camera than colour's: camera.toml of the folder.
+  test::write_text(dir / "camera.toml", "depth_scale = 1000\ndepth_bias = [0, 1.02]\n" + lens);
+  auto plain = open_source("tum:" + dir.path(), {});
+  ASSERT_TRUE(plain) << plain.error();
+  EXPECT_EQ((*plain)->info().depth_bias.c[1], 1.02f);
+  EXPECT_EQ((*plain)->info().depth_units_per_m, 1000.0f);
+  const auto raw = first_depth(**plain);
+  // camera.calibration wins over it, and depth that is not registered is registered.
+  test::write_text(dir / "my.toml", "depth_bias = [0, 1.03]\n[colour]\n" + lens + "[depth]\n" + lens +
+                                        "T_colour_depth = [-0.1, 0, 0, 0, 0, 0, 1]\n");
+  SourceOptions options;
+  options.dataset.calibration = dir / "my.toml";
+  auto calibrated = open_source("tum:" + dir.path(), options);
+  ASSERT_TRUE(calibrated) << calibrated.error();
+  EXPECT_EQ((*calibrated)->info().depth_bias.c[1], 1.03f);
+  EXPECT_FALSE((*calibrated)->info().depth_camera);
+  const auto registered = first_depth(**calibrated);
+  EXPECT_NE(registered, raw);
+  // The same said by the folder itself.
+  test::write_text(dir / "camera.toml",
+                   lens + "[depth]\n" + lens + "T_colour_depth = [-0.1, 0, 0, 0, 0, 0, 1]\n");
+  auto by_folder = open_source("tum:" + dir.path(), {});
+  ASSERT_TRUE(by_folder) << by_folder.error();
+  EXPECT_FALSE((*by_folder)->info().depth_camera);
+  EXPECT_NE(first_depth(**by_folder), raw);
+  // What a scene's camera is, is known exactly.
+  auto scene = open_source("synthetic:static,size=64x48,seconds=1", options);
+  ASSERT_TRUE(scene) << scene.error();
+  EXPECT_TRUE((*scene)->info().depth_bias.none());
+  options.dataset.calibration = dir / "no.toml";
+  EXPECT_EQ(open_source("tum:" + dir.path(), options).error_kind(), ErrorKind::bad_usage);
 }
 
 TEST(Registry, OpensSyntheticScenes) {
