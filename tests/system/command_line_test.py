@@ -123,8 +123,10 @@ class Usage(Case):
         self.refused(2, "run", "--source", "nothing", says=["nothing"])
         self.refused(2, "run", "--source", "synthetic:no_such_scene", says=["no_such_scene"])
 
-    def test_parts_that_are_not_built_say_so(self):
-        self.refused(2, "run", "--source", "v4l2:/dev/video0", says=["build"])
+    def test_a_camera_that_is_not_there(self):
+        self.refused(2, "run", "--source", "v4l2:/dev/video98", says=["--camera"])
+        self.refused(3, "run", "--source", "v4l2:/dev/video98", "--camera", "525,525,319.5,239.5",
+                     says=["/dev/video98", "No such file"])
 
     def test_doctor(self):
         done = stillmap("doctor", "--source", SMALL, "--out", self.out)
@@ -611,13 +613,13 @@ class Trouble(Case):
         self.assertNotIn("terminate", done.stderr)
 
     def test_disk_that_fills_up_during_the_run(self):
-        # The configuration still fits, the trajectory of six seconds does not.
+        # The configuration still fits, the trajectory of twelve seconds does not.
         most = (ROOT / "config/presets/default.toml").stat().st_size + 500
 
         def limit():
             resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
 
-        done = stillmap("run", "--source", "synthetic:crowd,size=160x120,seconds=6", *LITTLE, "--out", self.out,
+        done = stillmap("run", "--source", "synthetic:crowd,size=160x120,seconds=12", *LITTLE, "--out", self.out,
                         preexec_fn=limit)
         self.assertEqual(done.returncode, 1, done.stdout + done.stderr)
         for name in ["trajectory.txt", "states.csv", "mesh.ply"]:
@@ -630,7 +632,7 @@ class Trouble(Case):
         rows = read_csv(self.out / "states.csv")
         self.assertEqual({len(row) for row in rows}, {26})
         report = json.loads((self.out / "report.json").read_text())
-        self.assertEqual(report["frames"], 180)
+        self.assertEqual(report["frames"], 360)
         self.assertGreaterEqual(report["faults"]["record_failed"], 3)
 
     def stop(self, number):
