@@ -50,7 +50,8 @@ bool MjpegDecoder::submit(const Job& job) {
 }
 
 bool MjpegDecoder::take(Decoded& decoded) {
-  // An event comes behind its image, which so is there; `pop` may fail all the same while the next one is put in.
+  // An event comes behind its image, which so is there; `pop` may fail all the same while the next one is put
+  // in.
   constexpr std::chrono::milliseconds kMost{100};
   uint64_t one = 0;
   if (::read(event_, &one, sizeof(one)) < 0 || !done_.pop_within(decoded, kMost)) return false;

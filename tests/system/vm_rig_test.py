@@ -46,11 +46,11 @@ class Rig(unittest.TestCase):
     def qemu(self, body):
         self.tool("qemu-system-x86_64", body)
 
-    def run_script(self, *arguments, seconds="20"):
+    def run_script(self, *arguments, seconds="100"):
         environment = {"PATH": str(self.tools), "STILLMAP_VM_CACHE": str(self.cache), "STILLMAP_VM_TIMEOUT_S": seconds,
                        "HOME": str(self.folder)}
         return subprocess.run([str(self.tools / "bash"), str(VM / "run.sh"), str(self.script), *arguments],
-                              capture_output=True, text=True, env=environment, timeout=60)
+                              capture_output=True, text=True, env=environment, timeout=200)
 
     def test_the_guests_answer_is_passed_on(self):
         self.fill_cache()
