@@ -403,6 +403,12 @@ void RunOutputs::finish(Engine& engine, const FrameSource& source, const Pipelin
   events_.info(last_stamp_, "stop",
                fmt::format("{} frames; at most {} blocks with voxels in one view", counters.frames,
                            counters.most_visible_blocks));
+  if (counters.not_mapped > 0)
+    events_.info(
+        last_stamp_, "completion",
+        fmt::format("{} frames that waited to be completed were not mapped: the camera was lost, or the map "
+                    "given up",
+                    counters.not_mapped));
   rewrite_report();
   events_.set_listener({});
   if (log_ && !log_->close()) tell(log_->error());

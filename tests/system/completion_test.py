@@ -16,7 +16,7 @@ from pathlib import Path
 PROGRAM, ROOT = sys.argv[1:3]
 SETTINGS = ["--set", "map.voxel_m=0.02", "--set", "record.snapshots=0", "--quiet"]
 COMPLETE = ["--set", "depth.invalid=complete"]
-HALL = "hall,size=96x72,seconds=7"
+HALL = "hall,size=128x96,seconds=8"
 NEAR = "near,size=96x72,seconds=5"
 NEAR_M = 0.03  # a voxel and a half
 
