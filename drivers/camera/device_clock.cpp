@@ -47,7 +47,9 @@ void DeviceClock::start(Least sample) {
 /// A frame cannot arrive before it was taken; it can be late, but not all of them for long.
 bool DeviceClock::jumped(int64_t device_ns, int64_t residual_ns) {
   late_frames_ = residual_ns > kJumpNs ? late_frames_ + 1 : 0;
-  return device_ns <= last_device_ns_ || residual_ns < -kJumpNs || late_frames_ >= kLateFrames;
+  // What came first may itself have been late.
+  const int64_t too_early_ns = windows_over_ == 0 ? -kWindowNs : -kJumpNs;
+  return device_ns <= last_device_ns_ || residual_ns < too_early_ns || late_frames_ >= kLateFrames;
 }
 
 void DeviceClock::add(Least sample) {

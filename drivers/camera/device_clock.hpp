@@ -16,9 +16,11 @@ namespace stillmap {
 class DeviceClock {
  public:
   static constexpr int64_t kWindowNs = 1'000'000'000;
-  static constexpr int64_t kJumpNs = 50'000'000;  ///< farther from the estimate than any delay or drift
-  static constexpr uint32_t kLateFrames = 30;     ///< late by more than that one after the other: a jump
-  static constexpr double kMostDrift = 500e-6;    ///< seconds a second; quartz is ten times better
+  static constexpr int64_t kJumpNs =
+      50'000'000;                               ///< farther from the estimate than any delay or drift; in
+                                                ///< the first window, before which little is known, kWindowNs
+  static constexpr uint32_t kLateFrames = 30;   ///< late by more than that one after the other: a jump
+  static constexpr double kMostDrift = 500e-6;  ///< seconds a second; quartz is ten times better
 
   struct Mapped {
     int64_t monotonic_ns = 0;

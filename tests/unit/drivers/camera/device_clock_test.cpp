@@ -117,6 +117,22 @@ TEST(DeviceClock, AStalledReaderIsNoJump) {
   EXPECT_EQ(clock.jumps(), 0u);
 }
 
+TEST(DeviceClock, AFirstFrameThatIsLateIsNoJump) {
+  Camera camera;
+  camera.delay_ns = [](int i) { return i == 0 ? 400 * kClockMs : 2 * kClockMs; };
+  DeviceClock clock;
+  camera.send(clock, 0);
+  int64_t last = 0;
+  for (int i = 13; i < 100; ++i) {  // those between came while it was on its way
+    const auto mapped = camera.send(clock, i);
+    EXPECT_FALSE(mapped.jumped) << i;
+    EXPECT_EQ(mapped.monotonic_ns, camera.taken_ns(i) + 2 * kClockMs);
+    EXPECT_GT(mapped.monotonic_ns, last);
+    last = mapped.monotonic_ns;
+  }
+  EXPECT_EQ(clock.jumps(), 0u);
+}
+
 TEST(DeviceClock, GoesOnRisingWhenTheDeviceIsOpenedAgain) {
   Camera camera;
   camera.delay_ns = [](int) { return 20 * kClockMs; };
