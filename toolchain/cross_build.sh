@@ -10,7 +10,7 @@ toolchain/setup.sh --cross
 
 libraries=(
   libc6-dev libstdc++6 libeigen3-dev libfmt-dev libcli11-dev nlohmann-json3-dev libtomlplusplus-dev libnanoflann-dev
-  libspng-dev libsystemd-dev libturbojpeg0-dev libzstd-dev libcairo2-dev libgpiod-dev liblcm-dev libgtest-dev
+  libspng-dev libsystemd-dev libturbojpeg0-dev libzstd-dev libcairo2-dev libgpiod-dev libopenni2-dev liblcm-dev libgtest-dev
 )
 sysroot=$PWD/build/sysroot-arm64
 apt=$PWD/build/apt-arm64
