@@ -40,6 +40,6 @@ Result<std::unique_ptr<CommandPort>> open_lcm_commands(const std::string& url);
 ///              thread, and must not throw
 /// @thread boot
 Result<std::unique_ptr<OdometryPort>> open_lcm_odometry(const std::string& url,
-                                                       std::function<Stamp(Utime)> clock);
+                                                        std::function<Stamp(Utime)> clock);
 
 }  // namespace stillmap

@@ -79,7 +79,7 @@ class NetworkOdometry final : public OdometryPort {
 }  // namespace
 
 Result<std::unique_ptr<OdometryPort>> open_lcm_odometry(const std::string& url,
-                                                       std::function<Stamp(Utime)> clock) {
+                                                        std::function<Stamp(Utime)> clock) {
   auto odometry = std::make_unique<NetworkOdometry>(std::move(clock));
   if (const auto opened = odometry->open(url); !opened) return Error{opened.error(), opened.error_kind()};
   return std::unique_ptr<OdometryPort>(std::move(odometry));
