@@ -60,10 +60,11 @@ int bench_soak(const BenchOptions& o) {
   run_options.max_frames = o.max_frames > 0 ? o.max_frames : 10000;
   run_options.quiet = true;
   run_options.lcm = o.lcm;
-  // Every output is on, each of them bounded.
+  // Every output is on, each of them bounded; each has begun anew, and taken the memory that it needs for
+  // that, before the settled state is looked at.
   run_options.settings = {"record.log=true",         "record.frames=true",        "record.map=true",
-                          "record.map_every_s=60",   "record.log_file_bytes=2e7", "record.log_max_bytes=4e7",
-                          "record.stream_bytes=1e6", "record.mesh=false"};
+                          "record.map_every_s=5",    "record.log_file_bytes=2e6", "record.log_max_bytes=8e6",
+                          "record.stream_bytes=5e4", "record.mesh=false"};
   run_options.settings.insert(run_options.settings.end(), o.settings.begin(), o.settings.end());
   MemoryWatch memory(run_options.max_frames);
   const int code = run(run_options, &memory);
