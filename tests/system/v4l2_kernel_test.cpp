@@ -174,8 +174,10 @@ TEST_F(V4l2Kernel, EveryPairArrives) {
               kFrames, came(kDepthNode), came(kColourNode), skipped(kDepthNode), skipped(kColourNode),
               left_out);
   // An image may have waited for its partner before the first frame, and one may wait behind the last. Depth
-  // whose colour the driver skipped is left out.
-  EXPECT_LE(left_out, skipped(kDepthNode) + skipped(kColourNode));
+  // whose colour the driver skipped is left out. And the nodes run by themselves: half a period apart, an
+  // image that is a little late has another partner, and the one in between has none.
+  constexpr uint32_t kSlips = 3;
+  EXPECT_LE(left_out, skipped(kDepthNode) + skipped(kColourNode) + kSlips);
   EXPECT_NEAR(came(kDepthNode), kFrames + static_cast<int32_t>(left_out - skipped(kDepthNode)), 1);
   EXPECT_NEAR((kFrames - 1) / (last.seconds() - first.seconds()), 30, 3);
 }
