@@ -318,8 +318,8 @@ TEST_F(Executives, ACameraThatIsGoneIsOpenedAgainAndTheMapStays) {
   reopen_failures = 3;
   const RunEnd end = run("crowd-static,size=80x60,seconds=3", true);
   EXPECT_EQ(end.error, "");
-  if (heap_guard::counts())  // with a sanitizer too few frames are left to find the camera in
-    EXPECT_EQ(end.state, TrackingState::good);
+  // With a sanitizer too few frames are left to find the camera in.
+  EXPECT_TRUE(end.state == TrackingState::good || !heap_guard::counts());
   ASSERT_EQ(reopened_ns.size(), 4u);
   // Twice the wait after each failure, up to the longest.
   EXPECT_GE(reopened_ns[1] - reopened_ns[0], 100'000'000);
