@@ -7,29 +7,19 @@ hand before the lens carves the room behind it unless the sonar tells of it. And
 
 import json
 import math
-import struct
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
-PROGRAM, ROOT = sys.argv[1:3]
-SETTINGS = ["--set", "map.voxel_m=0.02", "--set", "record.snapshots=0", "--quiet"]
+from map_scenes import NEAR_M, ghosts, points_of, run, stillmap
+
 COMPLETE = ["--set", "depth.invalid=complete"]
 HALL = "hall,size=128x96,seconds=8"
 NEAR = "near,size=96x72,seconds=5"
-NEAR_M = 0.03  # a voxel and a half
 
 
-def stillmap(*arguments):
-    done = subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, cwd=ROOT)
-    if done.returncode != 0:
-        sys.exit(f"{' '.join(map(str, arguments))} ended with {done.returncode}\n{done.stdout}{done.stderr}")
-    return done.stdout
-
-
-def run(out, scene, *more):
-    stillmap("run", "--source", f"synthetic:{scene}", *SETTINGS, "--out", out, *more)
+def checked_run(out, scene, *more):
+    run(out, scene, *more)
     report = json.loads((out / "report.json").read_text())
     if report["heap_allocations_in_loop"] or report["lost_frames"]:
         sys.exit(f"{scene}: allocations {report['heap_allocations_in_loop']}, lost {report['lost_frames']}, expected none")
@@ -41,32 +31,19 @@ def ate_m(out):
     return json.loads(answer)["rmse_m"]
 
 
-def ghosts(out):
-    answer = stillmap("evaluate", "model", "--truth", out / "truth_cloud.ply", "--mesh", out / "mesh.ply", "--json")
-    return json.loads(answer)["ghosts"]
-
-
-def vertices(out):
-    """Of mesh.ply, metres."""
-    data = (out / "mesh.ply").read_bytes()
-    start = data.index(b"end_header\n") + len(b"end_header\n")
-    count = int(data[:start].decode().split("element vertex ")[1].split()[0])
-    return [struct.unpack_from("<fff", data, start + 15 * i) for i in range(count)]
-
-
 def cells(points):
     return {tuple(math.floor(x / NEAR_M) for x in p) for p in points}
 
 
 def share_there(wanted, out):
     """Of the cells `wanted`, how many have a vertex of the mesh in them or beside them."""
-    have = cells(vertices(out))
+    have = cells(points_of(out / "mesh.ply"))
     steps = [(i, j, k) for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1)]
     return sum(any((x + i, y + j, z + k) in have for i, j, k in steps) for x, y, z in wanted) / len(wanted)
 
 
 def check_hall(folder, misses):
-    ignored, completed = run(folder / "hall", HALL), run(folder / "hall_complete", HALL, *COMPLETE)
+    ignored, completed = checked_run(folder / "hall", HALL), checked_run(folder / "hall_complete", HALL, *COMPLETE)
     without, with_it = ghosts(ignored), ghosts(completed)
     print(f"hall: {100 * without:.3f} % of the mesh are people without completion, {100 * with_it:.3f} % with it; "
           f"ATE {1000 * ate_m(ignored):.1f} and {1000 * ate_m(completed):.1f} mm")
@@ -78,12 +55,12 @@ def check_hall(folder, misses):
 
 def check_near(folder, misses):
     """What lies behind the hand, of the room as it is mapped without a hand."""
-    room = run(folder / "near_static", NEAR.replace("near", "near-static"))
-    behind = cells(p for p in vertices(room) if p[2] > 1.0 and math.hypot(p[0], p[1] + 0.04) < 0.3 * p[2])
+    room = checked_run(folder / "near_static", NEAR.replace("near", "near-static"))
+    behind = cells(p for p in points_of(room / "mesh.ply") if p[2] > 1.0 and math.hypot(p[0], p[1] + 0.04) < 0.3 * p[2])
     shares = {}
     for name, more in {"ignored": [], "with the sonar": COMPLETE,
                        "without": [*COMPLETE, "--set", "sonar.veto_m=0"]}.items():
-        out = run(folder / name.replace(" ", "_"), NEAR, *more)
+        out = checked_run(folder / name.replace(" ", "_"), NEAR, *more)
         shares[name] = share_there(behind, out)
         print(f"near, {name}: {shares[name]:.3f} of {len(behind)} cells behind the hand are in the mesh; "
               f"ATE {1000 * ate_m(out):.1f} mm")
@@ -97,7 +74,7 @@ def check_near(folder, misses):
 
 def check_replay(folder, misses):
     scene = "hall,size=96x72,seconds=3"
-    live = run(folder / "live", scene, *COMPLETE, "--set", "record.log=true", "--set", "record.frames=true")
+    live = checked_run(folder / "live", scene, *COMPLETE, "--set", "record.log=true", "--set", "record.frames=true")
     stillmap("replay", live, "--out", folder / "replayed", "--quiet")
     for name in ["trajectory.txt", "mesh.ply"]:
         if (live / name).read_bytes() != (folder / "replayed" / name).read_bytes():

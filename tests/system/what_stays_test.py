@@ -4,35 +4,14 @@
     what_stays_test.py PROGRAM SOURCE_ROOT
 """
 
-import json
 import math
-import struct
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
-PROGRAM, ROOT = sys.argv[1:3]
-SIZE = "size=160x120"
-SETTINGS = ["--set", "map.voxel_m=0.02", "--set", "record.snapshots=0", "--quiet"]
-NEAR_M = 0.03  # a voxel and a half
+from map_scenes import NEAR_M, ghosts, points_of, run
 
-
-def stillmap(*arguments):
-    done = subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, cwd=ROOT)
-    if done.returncode != 0:
-        sys.exit(f"{' '.join(map(str, arguments))} ended with {done.returncode}\n{done.stdout}{done.stderr}")
-    return done.stdout
-
-
-def points_of(path):
-    """Vertices of a binary PLY, metres."""
-    data = path.read_bytes()
-    start = data.index(b"end_header\n") + len(b"end_header\n")
-    head = data[:start].decode()
-    count = int(head.split("element vertex ")[1].split()[0])
-    step = 15 if "uchar red" in head else 12
-    return [struct.unpack_from("<fff", data, start + step * i) for i in range(count)]
+SIZE = ",size=160x120"
 
 
 class Grid:
@@ -54,20 +33,10 @@ class Grid:
                    for q in self.cells.get((x + i, y + j, z + k), ()))
 
 
-def run(out, scene, *more):
-    stillmap("run", "--source", f"synthetic:{scene},{SIZE}", *SETTINGS, "--out", out, *more)
-    return out
-
-
-def ghosts(out):
-    answer = json.loads(stillmap("evaluate", "model", "--truth", out / "truth_cloud.ply", "--mesh", out / "mesh.ply", "--json"))
-    return answer["ghosts"]
-
-
 def share_of_put_down_box(folder):
     """Of the side of the box that faces the camera: how much is in the mesh."""
-    with_box = run(folder / "placing", "placing_box")
-    without = run(folder / "without", "placing_box-static", "--max-frames", "2")
+    with_box = run(folder / "placing", "placing_box" + SIZE)
+    without = run(folder / "without", "placing_box-static" + SIZE, "--max-frames", "2")
     before = Grid(points_of(without / "truth_cloud.ply"), 0.05)
     nearest_first = sorted(points_of(with_box / "truth_cloud.ply"), key=lambda p: p[2])
     box = [p for p in nearest_first if p[2] < 2.2 and abs(p[0]) < 0.6 and not before.has_near(p)]
@@ -84,7 +53,7 @@ def main():
         if count < 500 or share < 0.95:
             misses.append(f"placing_box: {share:.3f} of {count} points, expected 0.95 of 500 or more")
         for scene in ["removing_box", "crowd"]:
-            share = ghosts(run(Path(name) / scene, scene))
+            share = ghosts(run(Path(name) / scene, scene + SIZE))
             print(f"{scene}: {100 * share:.3f} % of the mesh is far from what stands there at the end")
             if share > 0.0005:
                 misses.append(f"{scene}: {100 * share:.3f} % of the mesh, expected 0.05 % or less")
