@@ -1,7 +1,7 @@
 // The sonar's driver and its thread on the kernel's simulated GPIO chip (gpio-sim). Runs in the virtual
 // machine: vm_sonar.sh makes the chip "sonar" with the lines 0 trigger, 1 echo, 2 stop, and names its places:
 //   sonar_kernel_test CHIP_DEVICE SYSFS GPIO_SIM_SH [--gtest_...]     the tests
-//   sonar_kernel_test --echo SYSFS WIDTH_US SECONDS                   only answers triggers
+//   sonar_kernel_test --pulses SYSFS WIDTH_US SECONDS                 only is a pulse width sensor
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
@@ -72,7 +72,6 @@ class Echoes {
   }
 
   std::atomic<int64_t> width_us;
-  std::atomic<int> answered{0};
 
  private:
   void run(const std::string& sysfs) {
@@ -90,13 +89,20 @@ class Echoes {
       echo.pull(true);
       sleep_ns(width_us * kUs);
       echo.pull(false);
-      ++answered;
     }
   }
 
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };
+
+/// What a sensor that needs no trigger does, twenty times a second.
+void pulse(const Wire& echo, int64_t width_us) {
+  echo.pull(true);
+  sleep_ns(width_us * kUs);
+  echo.pull(false);
+  sleep_ns(50 * kMs - width_us * kUs);
+}
 
 SonarConfig hc_sr04() {
   SonarConfig sonar;
@@ -185,9 +191,7 @@ TEST(SonarOnGpioSim, TheStopLineSaysStopAtOnceAndAtTheEnd) {
   Running sonar(hc_sr04());
   EXPECT_TRUE(sonar.within(kSecond, [] { return stop_level() == 0; })) << "free to go";
   echoes.width_us = 1000;  // 17 cm
-  const int answered = echoes.answered;
-  ASSERT_TRUE(sonar.within(kSecond, [&] { return echoes.answered > answered + 1; }));
-  EXPECT_EQ(stop_level(), 1);
+  EXPECT_TRUE(sonar.within(250 * kMs, [] { return stop_level() == 1; })) << "five triggers";
   echoes.width_us = 8000;
   EXPECT_TRUE(sonar.within(kSecond, [] { return stop_level() == 0; }));
   sonar.stop();
@@ -217,18 +221,13 @@ TEST(SonarOnGpioSim, APulseWidthSensorIsReadWithoutATrigger) {
   std::atomic<bool> done{false};
   std::thread sensor([&] {
     const Wire echo(g_sysfs, 1, "pull", O_WRONLY);
-    while (!done) {
-      echo.pull(true);
-      sleep_ns(5800 * kUs);  // a metre
-      echo.pull(false);
-      sleep_ns(90 * kMs);
-    }
+    while (!done) pulse(echo, 5800);  // a metre
   });
   Running sonar(config);
   const std::vector<RangeReading> readings = sonar.listen(kSecond);
   done = true;
   sensor.join();
-  ASSERT_GE(readings.size(), 8u);
+  ASSERT_GE(readings.size(), 15u);
   EXPECT_TRUE(readings.back().valid);
   EXPECT_GE(readings.back().range_m, 1.0f);
   EXPECT_LE(readings.back().range_m, 1.07f);
@@ -245,10 +244,15 @@ TEST(SonarOnGpioSim, NoiseIsNoReadingAndEndsNothing) {
   EXPECT_TRUE(
       sonar.within(2 * kSecond, [&] { return stop_level() == 0 && !sonar.holds(Fault::range_lost); }));
   sonar.listen(100 * kMs);
-  for (const RangeReading& reading : sonar.listen(500 * kMs)) {
-    EXPECT_TRUE(reading.valid);
+  const std::vector<RangeReading> readings = sonar.listen(kSecond);
+  ASSERT_GE(readings.size(), 15u);
+  size_t valid = 0;
+  for (const RangeReading& reading : readings) {
+    if (!reading.valid) continue;
+    ++valid;
     EXPECT_NEAR(reading.range_m, 1.02, 0.05);
   }
+  EXPECT_GE(4 * valid, 3 * readings.size()) << "the one that answers may miss a trigger";
 }
 
 TEST(SonarOnGpioSim, WhatIsWrongWithALineIsSaid) {
@@ -288,21 +292,22 @@ TEST(SonarOnGpioSim, AChipThatIsPulledOutComesBack) {
       sonar.within(12 * kSecond, [&] { return !sonar.holds(Fault::range_lost) && stop_level() == 0; }));
 }
 
-int echo_only(char** arguments) {
-  const Echoes echoes(arguments[0], std::atol(arguments[1]));
-  std::this_thread::sleep_for(std::chrono::seconds(std::atol(arguments[2])));
-  std::printf("%d triggers answered\n", echoes.answered.load());
-  return echoes.answered > 0 ? 0 : 1;
+int pulses_only(char** arguments) {
+  const Wire echo(arguments[0], 1, "pull", O_WRONLY);
+  const int64_t width_us = std::atol(arguments[1]);
+  const int64_t until_ns = monotonic_ns() + std::atol(arguments[2]) * kSecond;
+  while (monotonic_ns() < until_ns) pulse(echo, width_us);
+  return 0;
 }
 
 }  // namespace
 }  // namespace stillmap
 
 int main(int count, char** arguments) {
-  if (count == 5 && std::string(arguments[1]) == "--echo") return stillmap::echo_only(arguments + 2);
+  if (count == 5 && std::string(arguments[1]) == "--pulses") return stillmap::pulses_only(arguments + 2);
   testing::InitGoogleTest(&count, arguments);
   if (count != 4) {
-    std::fprintf(stderr, "expected CHIP_DEVICE SYSFS GPIO_SIM_SH, or --echo SYSFS WIDTH_US SECONDS\n");
+    std::fprintf(stderr, "expected CHIP_DEVICE SYSFS GPIO_SIM_SH, or --pulses SYSFS WIDTH_US SECONDS\n");
     return 2;
   }
   stillmap::g_chip = arguments[1];
