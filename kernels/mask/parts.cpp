@@ -152,16 +152,19 @@ void grow(const CellGrid& cells, const PartMemory& memory, float grow_m) {
 
 }  // namespace
 
-int32_t segment(const CellGrid& cells, const PartMemory& memory, const MaskParams& params,
-                const DepthNoise& noise) {
-  const int32_t rows = cells.part.rows, cols = cells.part.cols;
+void find_bends(const CellGrid& cells, const PartMemory& memory, const MaskParams& params, int32_t first_row,
+                int32_t last_row) {
   const float cos_bend = std::cos(params.part_concave_deg * 3.14159265f / 180.0f);
-  for (int32_t r = 0; r < rows; ++r)
-    for (int32_t c = 0; c < cols; ++c) {
+  for (int32_t r = first_row; r < last_row; ++r)
+    for (int32_t c = 0; c < cells.part.cols; ++c) {
       const bool bend = concave(cells, r, c, 0, 1, cos_bend) || concave(cells, r, c, 1, 0, cos_bend);
       memory.border.at(r, c) = bend ? kSet : uint8_t{0};
-      cells.part.at(r, c) = -1;
     }
+}
+
+int32_t segment(const CellGrid& cells, const PartMemory& memory, const DepthNoise& noise) {
+  const int32_t rows = cells.part.rows, cols = cells.part.cols;
+  std::fill_n(cells.part.data, cells.part.pixels(), -1);
   int32_t parts = 0;
   for (int32_t i = 0; i < rows * cols; ++i)
     if (cells.part.data[i] < 0 && cells.depth_m.data[i] > 0.0f && !memory.border.data[i])
@@ -186,7 +189,15 @@ void add_to_box(Part& part, int32_t r, int32_t c) {
 
 void gather_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory, const DepthNoise& noise) {
   for (int32_t i = 0; i < parts; ++i) memory.parts[static_cast<uint32_t>(i)] = {};
-  for (int32_t r = 0; r < cells.part.rows; ++r)
+  for (int32_t r = 0; r < cells.part.rows; ++r) {
+    // Neighbours mostly belong to one part: what they say of its motion is added up first.
+    NormalEqT<float> run;
+    int32_t run_of = -1;
+    const auto end_run = [&](int32_t next) {
+      if (run_of >= 0) memory.parts[static_cast<uint32_t>(run_of)].motion.add(run);
+      run = {};
+      run_of = next;
+    };
     for (int32_t c = 0; c < cells.part.cols; ++c) {
       if (cells.part.at(r, c) < 0) continue;
       Part& part = memory.parts[static_cast<uint32_t>(cells.part.at(r, c))];
@@ -206,11 +217,12 @@ void gather_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory
       }
       const CellResidual& residual = cells.residual.at(r, c);
       if (residual.terms.depth_weight > 0.0f) {
-        float sum[kTerms] = {};
-        add_point(residual.terms, residual.arm, 1.0f, 1.0f, sum);
-        for (int32_t t = 0; t < kTerms; ++t) part.motion.sum[t] += static_cast<double>(sum[t]);
+        if (cells.part.at(r, c) != run_of) end_run(cells.part.at(r, c));
+        add_point(residual.terms, residual.arm, 1.0f, 1.0f, run.sum);
       }
     }
+    end_run(-1);
+  }
   for (int32_t i = 0; i < parts; ++i) {
     Part& part = memory.parts[static_cast<uint32_t>(i)];
     if (part.cells > 0) part.noise_m /= static_cast<float>(part.cells);

@@ -31,11 +31,14 @@ struct PartMemory {
   ImageView<uint8_t> scratch;
 };
 
-/// Fills cells.part: connected cells without a jump in depth or a concave bend between them have the same
-/// number.
+/// Marks the cells of rows [first_row, last_row) that lie on a concave bend: memory.border.
+void find_bends(const CellGrid& cells, const PartMemory& memory, const MaskParams& params, int32_t first_row,
+                int32_t last_row);
+
+/// Fills cells.part: connected cells without a jump in depth or a concave bend (find_bends) between them have
+/// the same number.
 /// @return number of parts                                              test: parts_test
-int32_t segment(const CellGrid& cells, const PartMemory& memory, const MaskParams& params,
-                const DepthNoise& noise);
+int32_t segment(const CellGrid& cells, const PartMemory& memory, const DepthNoise& noise);
 
 /// Visits the cells of part number `i`.
 template <class F>

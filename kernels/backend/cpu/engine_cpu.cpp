@@ -228,6 +228,7 @@ class CpuEngine final : public Engine {
   void forget_cells();
   void mask_by_residual(const Se3& T_map_cam);
   void mask_by_parts(const Se3& T_map_cam);
+  void count_masked(MaskResult& result);
   void write_trust(ImageView<const uint8_t> mask, int32_t step);
   template <class F>
   void in_row_tiles(int32_t rows, const F& f) {
@@ -384,7 +385,10 @@ void CpuEngine::mask_by_parts(const Se3& T_map_cam) {
   const StillPass still{cells, memory_.before, inverse(T_before_) * T_map_cam, noise, reabsorb_frames() / 2};
   in_row_tiles(cells.depth_m.rows,
                [&](int32_t first, int32_t last) { loops_.still_cells(still, first, last); });
-  const int32_t parts = segment(cells, memory_.part_memory, params_.mask, noise);
+  in_row_tiles(cells.depth_m.rows, [&](int32_t first, int32_t last) {
+    find_bends(cells, memory_.part_memory, params_.mask, first, last);
+  });
+  const int32_t parts = segment(cells, memory_.part_memory, noise);
   gather_parts(cells, parts, memory_.part_memory, noise);
   const Twistd motion = agree_on_motion(parts, memory_.part_memory, params_.mask, usual_);
   const Se3 T_agreed = moved_about_centre(T_map_cam, motion);
@@ -477,11 +481,27 @@ MaskResult CpuEngine::mask(const Se3& T_world_cam) {
     mask_by_parts(T_world_cam);
   else
     mask_by_residual(T_world_cam);
-  for (int32_t i = 0; i < memory_.mask.pixels(); ++i) {
-    result.masked_pixels += memory_.mask.data[i] != 0;
-    result.masked_valid_pixels += memory_.mask.data[i] != 0 && memory_.depth_m.data[i] > 0;
-  }
+  count_masked(result);
   return result;
+}
+
+void CpuEngine::count_masked(MaskResult& result) {
+  in_row_tiles(k().height, [&](int32_t first, int32_t last) {
+    int32_t masked = 0, valid = 0;
+    for (int32_t r = first; r < last; ++r)
+      for (int32_t c = 0; c < k().width; ++c) {
+        const auto here = static_cast<int32_t>(memory_.mask.at(r, c) != 0);
+        masked += here;
+        valid += here & static_cast<int32_t>(memory_.depth_m.at(r, c) > 0.0f);
+      }
+    const auto tile = static_cast<uint32_t>(first / kRowsPerTile);
+    memory_.masked_tiles[tile] = masked;
+    memory_.valid_tiles[tile] = valid;
+  });
+  for (uint32_t t = 0; t < tiles_of(k().height, kRowsPerTile); ++t) {
+    result.masked_pixels += memory_.masked_tiles[t];
+    result.masked_valid_pixels += memory_.valid_tiles[t];
+  }
 }
 
 void CpuEngine::mask_by_residual(const Se3& T_world_cam) {

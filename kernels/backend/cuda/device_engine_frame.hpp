@@ -310,7 +310,8 @@ bool DeviceEngine<Device>::find_parts(const Se3& T_map_cam) {
   if (!play(DeviceStep::evidence)) return false;
   CellGrid& found = h_.cells.grid;
   found.settled_frames = cells.settled_frames;
-  const int32_t parts = segment(found, h_.part_memory, p, noise);
+  find_bends(found, h_.part_memory, p, 0, found.depth_m.rows);
+  const int32_t parts = segment(found, h_.part_memory, noise);
   gather_parts(found, parts, h_.part_memory, noise);
   const Twistd motion = agree_on_motion(parts, h_.part_memory, p, usual_);
   const Se3 T_agreed = moved_about_centre(T_map_cam, motion);

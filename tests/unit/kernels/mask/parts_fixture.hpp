@@ -68,8 +68,12 @@ class PartsTest : public testing::Test {
     const CellNormalPass pass{cells};
     in({0, kRows, 0, kCols}, pass);
   }
+  int32_t find_parts() {
+    find_bends(cells, memory, params, 0, kRows);
+    return segment(cells, memory, noise);
+  }
   int32_t decide() {
-    const int32_t count = segment(cells, memory, params, noise);
+    const int32_t count = find_parts();
     gather_parts(cells, count, memory, noise);
     agree_on_motion(count, memory, params, usual);
     decide_parts(cells, count, memory, params, usual);

@@ -7,7 +7,7 @@ namespace {
 
 TEST_F(PartsTest, AJumpInDepthPartsTwoSurfaces) {
   put(kBox, kNearM, 0);
-  EXPECT_EQ(segment(cells, memory, params, noise), 2);
+  EXPECT_EQ(find_parts(), 2);
   EXPECT_NE(cells.part.at(30, 40), cells.part.at(5, 5));
   EXPECT_EQ(cells.part.at(5, 5), cells.part.at(55, 75));
 }
@@ -17,7 +17,7 @@ TEST_F(PartsTest, AConcaveBendPartsTwoWallsOfACornerAndAConvexOneDoesNotPartABal
     for (int32_t c = 0; c < kCols; ++c)
       cells.depth_m.at(r, c) = kWallM - 0.03f * std::fabs(static_cast<float>(c - 40));
   find_normals();
-  EXPECT_EQ(segment(cells, memory, params, noise), 2);
+  EXPECT_EQ(find_parts(), 2);
   EXPECT_NE(cells.part.at(30, 10), cells.part.at(30, 70));
 
   for (int32_t r = 0; r < kRows; ++r)
@@ -26,7 +26,7 @@ TEST_F(PartsTest, AConcaveBendPartsTwoWallsOfACornerAndAConvexOneDoesNotPartABal
       cells.depth_m.at(r, c) = d2 < 0.8f ? 1.5f - 0.5f * std::sqrt(1.0f - d2) : 0.0f;
     }
   find_normals();
-  EXPECT_EQ(segment(cells, memory, params, noise), 1);
+  EXPECT_EQ(find_parts(), 1);
 }
 
 TEST_F(PartsTest, APartThatContradictsTheMapIsDynamicAndNothingElse) {
@@ -100,7 +100,7 @@ TEST_F(PartsTest, TheLargerSpaceDecidesWhatMovesNotTheLargerPicture) {
   put(box, 0.7f, 0);
   shift({0, kRows, 0, kCols}, {});
   shift(box, {0.02f, 0, 0.01f});
-  const int32_t count = segment(cells, memory, params, noise);
+  const int32_t count = find_parts();
   gather_parts(cells, count, memory, noise);
   const Twistd motion = agree_on_motion(count, memory, params, usual);
   EXPECT_LT(norm(motion.v), 0.002);
@@ -112,7 +112,7 @@ TEST_F(PartsTest, TheLargerSpaceDecidesWhatMovesNotTheLargerPicture) {
 TEST_F(PartsTest, WhenTheCameraMovedNothingElseDid) {
   put(kBox, kNearM, 0);
   shift({0, kRows, 0, kCols}, {0.02f, -0.01f, 0.01f});
-  const int32_t count = segment(cells, memory, params, noise);
+  const int32_t count = find_parts();
   gather_parts(cells, count, memory, noise);
   const Twistd motion = agree_on_motion(count, memory, params, usual);
   EXPECT_NEAR(motion.v.x, -0.02, 0.002);
@@ -125,7 +125,7 @@ TEST_F(PartsTest, ASensorWithWarpedDepthRaisesWhatIsUsual) {
   put(kBox, kNearM, 0);
   shift({0, kRows, 0, kCols}, {});
   shift({0, 20, 0, kCols}, {0, 0, 0.03f});  // nothing fits: half of the wall, too
-  const int32_t count = segment(cells, memory, params, noise);
+  const int32_t count = find_parts();
   gather_parts(cells, count, memory, noise);
   agree_on_motion(count, memory, params, usual);
   EXPECT_GE(usual, 1.0f);

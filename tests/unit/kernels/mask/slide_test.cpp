@@ -32,7 +32,7 @@ class SlideTest : public PartsTest {
   }
   /// Cells of the box that still count as still.
   int32_t still_after(const Se3& T_earlier_now = {}) {
-    const int32_t count = segment(cells, memory, params, noise);
+    const int32_t count = find_parts();
     gather_parts(cells, count, memory, noise);
     agree_on_motion(count, memory, params, usual);
     restart_sliding(cells, count, memory, params, noise, earlier, T_earlier_now);
