@@ -83,18 +83,22 @@ template <class Cache>
 STILLMAP_HD bool fetch_corners_across(const VolumeView& map, Int3 base, Cache& cache, VoxelSurface voxel[8]) {
   const Int3 block = block_of_voxel(base), local = {base.x & 7, base.y & 7, base.z & 7};
   const int32_t crossed = (local.x == 7 ? 1 : 0) | (local.y == 7 ? 2 : 0) | (local.z == 7 ? 4 : 0);
-  BlockAt found[8];  // by the first corner in it: every part of `crossed`, 0 and all of it included
-  for (int32_t part = 0;; part = (part - crossed) & crossed) {
-    found[part] =
-        lookup(map, pack({block.x + (part & 1), block.y + (part >> 1 & 1), block.z + (part >> 2)}), cache);
-    if (!found[part]) return false;
-    if (part == crossed) break;
-  }
   const int32_t x[2] = {local.x, (local.x + 1) & 7}, y[2] = {local.y, (local.y + 1) & 7},
                 z[2] = {local.z, (local.z + 1) & 7};
-  for (int32_t i = 0; i < 8; ++i)
-    voxel[i] = found[i & crossed].surface(voxel_index(x[i & 1], y[i >> 1 & 1], z[i >> 2]));
-  return true;
+  // Blocks by the first corner in them: every part of `crossed`, 0 and all of it included. Of each, its
+  // corners: that one and those that differ from it by a part of the rest.
+  const int32_t rest = 7 & ~crossed;
+  for (int32_t part = 0;; part = (part - crossed) & crossed) {
+    const BlockAt found =
+        lookup(map, pack({block.x + (part & 1), block.y + (part >> 1 & 1), block.z + (part >> 2)}), cache);
+    if (!found) return false;
+    for (int32_t more = 0;; more = (more - rest) & rest) {
+      const int32_t i = part | more;
+      voxel[i] = found.surface(voxel_index(x[i & 1], y[i >> 1 & 1], z[i >> 2]));
+      if (more == rest) break;
+    }
+    if (part == crossed) return true;
+  }
 }
 
 /// Reads a voxel and its seven neighbours towards +x, +y, +z: 000 100 010 110 001 101 011 111. Those that

@@ -45,7 +45,8 @@ struct CpuMemory {
   PartMemory part_memory;
   DepthRangePyramid ranges;
   View<NormalEqT<float>> track_tiles;
-  View<int32_t> valid_tiles;
+  KeptCorners kept_corners;
+  View<int32_t> valid_tiles, masked_tiles;
   View<GroupView> groups;
   View<VisibleBlock> visible;
   View<uint8_t> extract_scratch, raycast_scratch;
@@ -69,7 +70,14 @@ struct CpuMemory {
     carve_ranges(arena, rows, cols);
     const uint32_t tiles = tiles_of(rows, kRowsPerTile);
     track_tiles = arena.take<NormalEqT<float>>("sums of tiles", tiles);
+    kept_corners.step = finest_step(p);
+    const int32_t kept_rows = (rows + kept_corners.step - 1) / kept_corners.step,
+                  kept_cols = (cols + kept_corners.step - 1) / kept_corners.step;
+    kept_corners.cell = arena.take_image<uint64_t>("points of a registration", kept_rows, kept_cols);
+    kept_corners.corners =
+        arena.take_image<KeptCorners::Corners>("points of a registration", kept_rows, kept_cols);
     valid_tiles = arena.take<int32_t>("sums of tiles", tiles);
+    masked_tiles = arena.take<int32_t>("sums of tiles", tiles);
     groups = arena.take<GroupView>("visible blocks", max_groups(p));
     visible = arena.take<VisibleBlock>("visible blocks", max_visible(p));
     extract_scratch = arena.take<uint8_t>("mesh and views",
@@ -446,6 +454,8 @@ TrackResult CpuEngine::register_to_map(const Se3& T_start, ImageView<const uint8
     int32_t sample;
   } context{this, track_pass(T_start), finest_step(params_)};
   context.pass.trust = trust;
+  const KeptCorners& kept = memory_.kept_corners;
+  in_row_tiles(kept.cell.rows, [&](int32_t first, int32_t last) { kept.forget_rows(first, last); });
   const PassRunner runner{[](void* opaque, const Se3& T_map_cam, int32_t step) {
                             Context& c = *static_cast<Context*>(opaque);
                             CpuEngine* const engine = c.engine;
@@ -456,8 +466,9 @@ TrackResult CpuEngine::register_to_map(const Se3& T_start, ImageView<const uint8
                             const uint32_t tiles = tiles_of(rows, kRowsPerTile);
                             engine->pool_.for_each(tiles, [&](uint32_t tile) {
                               const int32_t first = static_cast<int32_t>(tile) * kRowsPerTile;
-                              engine->memory_.track_tiles[tile] = engine->loops_.track(
-                                  pass, first, std::min(first + kRowsPerTile, rows), c.sample * step);
+                              engine->memory_.track_tiles[tile] =
+                                  engine->loops_.track(pass, engine->memory_.kept_corners, first,
+                                                       std::min(first + kRowsPerTile, rows), c.sample * step);
                             });
                             NormalEq sums;
                             for (uint32_t t = 0; t < tiles; ++t) sums.add(engine->memory_.track_tiles[t]);

@@ -74,7 +74,7 @@ struct PointBatch {
   /// @return how many are measured and trusted
   int32_t fill(const TrackPass& pass, int32_t row, int32_t first_col, int32_t count, int32_t step) {
     Int8 considered(0);
-    std::fill_n(known, kBatch, 0.0f);
+    for (int32_t i = 0; i < kBatch; i += kLanes) Float8(0.0f).store(&known[i]);
     for (int32_t i = 0; i < count; i += kLanes) {
       Float8 z_m(0.0f), measured(0.0f), trusted(0.0f);
       for (int32_t l = 0; l < kLanes && i + l < count; ++l) {
@@ -100,29 +100,46 @@ struct PointBatch {
     return sum;
   }
 
-  /// The voxels around each pixel. First where they lie, so that the memory can be on its way, then those in
-  /// one block, at last those across blocks: each loop does the same for every pixel.
-  void fetch(const TrackPass& pass, int32_t count, TrackBlocks& cache) {
+  /// The voxels around each pixel. Those that were kept; of the others first where they lie, so that the
+  /// memory can be on its way, then those in one block, at last those across blocks: each loop does the same
+  /// for every pixel.
+  /// @param entry of the first pixel in `kept`, @param stride from one to the next
+  void fetch(const TrackPass& pass, int32_t count, TrackBlocks& cache, uint64_t* kept_cell,
+             KeptCorners::Corners* kept_corners, int32_t stride) {
     const VoxelSurface* from[kBatch];
-    int32_t across[kBatch], crossing = 0;
+    int32_t fresh[kBatch], fetched = 0, across[kBatch], crossing = 0;
     for (int32_t i = 0; i < count; ++i) {
       known[i] = 0.0f;
-      from[i] = pass.map.free_block->surface;
-      if (!in_range[i]) continue;
+      if (!in_range[i]) {
+        Int8(0).store(voxel[i]);
+        continue;
+      }
       const Int3 base = {cell[0][i], cell[1][i], cell[2][i]};
+      const uint64_t word = KeptCorners::cell_word(base), kept = kept_cell[i * stride];
+      if ((kept & ~KeptCorners::kKnown) == word) {
+        Int8::load(&kept_corners[i * stride]).store(voxel[i]);
+        known[i] = kept & KeptCorners::kKnown ? 1.0f : 0.0f;
+        continue;
+      }
+      kept_cell[i * stride] = word;
+      fresh[fetched] = i;
+      from[fetched] = pass.map.free_block->surface;
       const BlockAt block = lookup(pass.map, pack(block_of_voxel(base)), cache);
-      if (!block) continue;
-      known[i] = 1.0f;
-      from[i] = block.voxels->surface + index_in_block(base);
-      __builtin_prefetch(from[i]);
-      __builtin_prefetch(from[i] + kBlockEdge * kBlockEdge);
-      across[crossing] = i;
-      crossing += static_cast<int32_t>(lies_across(base)) | static_cast<int32_t>(block.seen != nullptr);
+      if (block) {
+        known[i] = 1.0f;
+        from[fetched] = block.voxels->surface + index_in_block(base);
+        __builtin_prefetch(from[fetched]);
+        __builtin_prefetch(from[fetched] + kBlockEdge * kBlockEdge);
+        across[crossing] = i;
+        crossing += static_cast<int32_t>(lies_across(base)) | static_cast<int32_t>(block.seen != nullptr);
+      }
+      ++fetched;
     }
     // Those across blocks read something else of their block, here.
-    for (int32_t i = 0; i < count; ++i) {
+    for (int32_t n = 0; n < fetched; ++n) {
       constexpr int32_t y = kBlockEdge, z = kBlockEdge * kBlockEdge;
-      const VoxelSurface* v = from[i];
+      const VoxelSurface* v = from[n];
+      const int32_t i = fresh[n];
       std::memcpy(&voxel[i][0], v, 8);
       std::memcpy(&voxel[i][2], v + y, 8);
       std::memcpy(&voxel[i][4], v + z, 8);
@@ -132,7 +149,12 @@ struct PointBatch {
       const int32_t i = across[n];
       if (fetch_corners(pass.map, {cell[0][i], cell[1][i], cell[2][i]}, cache, voxel[i])) continue;
       known[i] = 0.0f;
-      std::fill_n(voxel[i], 8, VoxelSurface{0, 0});
+      Int8(0).store(voxel[i]);
+    }
+    for (int32_t n = 0; n < fetched; ++n) {
+      const int32_t i = fresh[n];
+      Int8::load(voxel[i]).store(&kept_corners[i * stride]);
+      if (known[i] > 0.0f) kept_cell[i * stride] |= KeptCorners::kKnown;
     }
   }
   /// @return false: the map knows none of the eight pixels from `first` on
@@ -161,7 +183,8 @@ struct PointBatch {
   }
 };
 
-NormalEqT<float> track(const TrackPass& pass, int32_t first_row, int32_t last_row, int32_t step) {
+NormalEqT<float> track(const TrackPass& pass, const KeptCorners& kept, int32_t first_row, int32_t last_row,
+                       int32_t step) {
   Float8 sums[kTerms];
   for (Float8& s : sums) s = Float8(0.0f);
   PointBatch points;
@@ -171,7 +194,9 @@ NormalEqT<float> track(const TrackPass& pass, int32_t first_row, int32_t last_ro
     for (int32_t c0 = 0; c0 < pass.depth_m.cols; c0 += kBatch * step) {
       const int32_t left = (pass.depth_m.cols - c0 + step - 1) / step, count = left < kBatch ? left : kBatch;
       considered += points.fill(pass, r, c0, count, step);
-      points.fetch(pass, count, cache);
+      const int32_t kept_row = r / kept.step, kept_col = c0 / kept.step;
+      points.fetch(pass, count, cache, kept.cell.row(kept_row) + kept_col,
+                   kept.corners.row(kept_row) + kept_col, step / kept.step);
       for (int32_t i = 0; i < count; i += kLanes) {
         if (!points.any_known(i)) continue;
         Float8 live;

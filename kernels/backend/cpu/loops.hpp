@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 
+#include "kernels/backend/cpu/kept_corners.hpp"
 #include "kernels/complete/temporary_model.hpp"
 #include "kernels/engine.hpp"
 #include "kernels/integrate/depth_range.hpp"
@@ -24,7 +25,9 @@ struct CpuLoops {
   /// @return pixels with a depth in range, rows [first, last)
   int32_t (*prepare)(const PreparePass&, int32_t first_row, int32_t last_row);
   /// Sums over every `step`-th pixel of every `step`-th row in [first, last).
-  NormalEqT<float> (*track)(const TrackPass&, int32_t first_row, int32_t last_row, int32_t step);
+  /// @param kept of the same map; written, the rows looked at only. `step` is a multiple of its own
+  NormalEqT<float> (*track)(const TrackPass&, const KeptCorners& kept, int32_t first_row, int32_t last_row,
+                            int32_t step);
   void (*residual_mask)(const ResidualMaskPass&, int32_t first_row, int32_t last_row);
   void (*cell_depth)(const CellDepthPass&, int32_t first_row, int32_t last_row);
   void (*cell_normals)(const CellNormalPass&, int32_t first_row, int32_t last_row);

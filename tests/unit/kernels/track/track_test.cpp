@@ -5,10 +5,12 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "kernels/backend/cpu/loops.hpp"
 #include "tests/support/corner_scene.hpp"
+#include "tests/support/test_image.hpp"
 
 namespace stillmap {
 namespace {
@@ -17,6 +19,7 @@ using test::corner_camera;
 using test::corner_map;
 using test::CornerScene;
 using test::CornerView;
+using test::TestImage;
 
 constexpr float kVoxelM = 0.02f, kTruncationM = 0.1f;
 
@@ -41,18 +44,39 @@ TrackPass pass_of(AnalyticMap& map, const CornerView& view, const Se3& T_map_cam
   return pass;
 }
 
+/// KeptCorners with its memory; nothing is kept yet.
+class Kept {
+ public:
+  explicit Kept(const Intrinsics& k)
+      : cell_(k.height, k.width), corners_(k.height, k.width), view{cell_.view(), corners_.view(), 1} {
+    view.forget_rows(0, k.height);
+  }
+
+ private:
+  TestImage<uint64_t> cell_;
+  TestImage<KeptCorners::Corners> corners_;
+
+ public:
+  const KeptCorners view;
+};
+
 /// register_frame over one of the loop tables, tiles of 16 rows.
 TrackResult registered(TrackPass pass, const Se3& T_start, const TrackParams& params,
                        int32_t min_points = 100) {
-  const PassRunner runner{[](void* context, const Se3& T_map_cam, int32_t step) {
-                            TrackPass& p = *static_cast<TrackPass*>(context);
+  const Kept kept(pass.k);
+  struct Context {
+    TrackPass& pass;
+    const KeptCorners& kept;
+  } context{pass, kept.view};
+  const PassRunner runner{[](void* opaque, const Se3& T_map_cam, int32_t step) {
+                            const auto& [p, corners] = *static_cast<Context*>(opaque);
                             p.T_map_cam = T_map_cam;
                             NormalEq sums;
                             for (int32_t r = 0; r < p.k.height; r += 16)
-                              sums.add(best_loops().track(p, r, std::min(r + 16, p.k.height), step));
+                              sums.add(best_loops().track(p, corners, r, std::min(r + 16, p.k.height), step));
                             return sums;
                           },
-                          &pass};
+                          &context};
   return register_frame(runner, T_start, params, {params.levels - 1, 0}, min_points);
 }
 
@@ -209,7 +233,8 @@ TEST_F(TrackTest, PlainPassEqualsTheVectorLoops) {
         BlockCache cache;
         for (int32_t r = 32; r < 64; r += step)
           for (int32_t c = 0; c < 160; c += step) pass(r, c, cache, plain);
-        const NormalEqT<float> vector = loops->track(pass, 32, 64, step);
+        const Kept kept(view.k);
+        const NormalEqT<float> vector = loops->track(pass, kept.view, 32, 64, step);
         EXPECT_EQ(plain.sum[kConsidered], vector.sum[kConsidered]);
         EXPECT_NEAR(plain.sum[kPoints], vector.sum[kPoints], 2);
         EXPECT_NEAR(plain.sum[kInliers], vector.sum[kInliers], 2);
@@ -243,9 +268,43 @@ TEST_F(TrackTest, UntrustedInvalidAndFarPixelsAreNotConsidered) {
   view.depth_m[8] = std::numeric_limits<float>::infinity();
   TrackPass pass = pass_of(map_, view, cast<float>(T_truth_), params_);
   pass.trust = view.image(trust);
-  const NormalEqT<float> sums = best_loops().track(pass, 0, view.k.height, 1);
+  const NormalEqT<float> sums = best_loops().track(pass, Kept(view.k).view, 0, view.k.height, 1);
   EXPECT_EQ(sums.sum[kConsidered], 2.0f);
   for (const float x : sums.sum) EXPECT_TRUE(std::isfinite(x));
+}
+
+TEST_F(TrackTest, WhatIsKeptFromOtherPosesChangesNothing) {
+  CornerView view(scene_, corner_camera(160), T_truth_);
+  for (size_t i = 0; i < view.depth_m.size(); i += 7)
+    view.depth_m[i] += 0.3f;  // some where nothing is mapped
+  TrackPass pass = pass_of(map_, view, cast<float>(T_truth_), params_);
+  for (const CpuLoops* loops : runnable_loops()) {
+    const Kept kept(view.k);
+    // Coarse to fine, as a registration goes; at the end back to a pose that was there before.
+    const std::pair<int32_t, float> passes[] = {{4, 0.012f}, {4, 0.004f}, {2, 0.002f},
+                                                {1, 0.001f}, {1, 0.0f},   {1, 0.0f}};
+    for (const auto& [step, off_m] : passes) {
+      pass.T_map_cam = cast<float>(T_truth_);
+      pass.T_map_cam.translation.x += off_m;
+      const NormalEqT<float> with = loops->track(pass, kept.view, 0, view.k.height, step),
+                             without = loops->track(pass, Kept(view.k).view, 0, view.k.height, step);
+      for (int32_t t = 0; t < kTerms; ++t)
+        EXPECT_EQ(with.sum[t], without.sum[t]) << loops->name << " term " << t;
+      EXPECT_GT(with.sum[kPoints], 100.0f);
+    }
+  }
+}
+
+TEST_F(TrackTest, WhatIsKeptIsOfTheMapAsItWas) {
+  const CornerView view(scene_, corner_camera(160), T_truth_);
+  const TrackPass pass = pass_of(map_, view, cast<float>(T_truth_), params_);
+  const Kept kept(view.k);
+  const float before = best_loops().track(pass, kept.view, 0, view.k.height, 1).sum[kSumSdf2];
+  for (uint32_t id = 0; id < map_.used_blocks(); ++id)
+    for (VoxelSurface& v : map_.view().blocks[id].surface) v.sdf = static_cast<int16_t>(v.sdf / 2);
+  EXPECT_EQ(best_loops().track(pass, kept.view, 0, view.k.height, 1).sum[kSumSdf2], before);
+  kept.view.forget_rows(0, view.k.height);
+  EXPECT_NE(best_loops().track(pass, kept.view, 0, view.k.height, 1).sum[kSumSdf2], before);
 }
 
 // --- the registration ---
