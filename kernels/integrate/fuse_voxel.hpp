@@ -106,42 +106,47 @@ struct FuseWeights {
   bool relearn = false;  ///< what changed soon outweighs what was there
 };
 
-/// Weighted running means of distance and colour of a voxel (paper III-A), and carving (III-D): in free space
-/// the observation is tau.                                                     test: integrate_test
+/// Weighted running mean of the distance of a voxel (paper III-A), and carving (III-D): in free space the
+/// observation is tau.                                                         test: integrate_test
 ///
-/// Distance and luminance are rounded to the nearest of 16 bits, chroma up or down by `dither01`: no bias. A
-/// voxel seen free moves by at least one unit, so that what is seen free long enough becomes exactly free.
-/// @param colour in the units of the voxel
+/// Rounded to the nearest of 16 bits. A voxel seen free moves by at least one unit, so that what is seen free
+/// long enough becomes exactly free.
 template <class F>
-STILLMAP_HD VoxelState<F> fused(VoxelState<F> v, const Observation<F>& o, F luma, F cb, F cr,
-                                const FuseWeights& p, F dither01) {
-  const F one = F(1.0f), cap = F(p.weight_cap), tau = F(static_cast<float>(kSdfMax));
-  const MaskOf<F> any = o.free | o.band;
+STILLMAP_HD VoxelState<F> fused_distance(VoxelState<F> v, const Observation<F>& o, const FuseWeights& p) {
+  const F one = F(1.0f), tau = F(static_cast<float>(kSdfMax));
   const F old = select(v.weight > F(0.0f), v.sdf, F(0.0f));
   const F observed = select(o.band, o.sdf_m * F(p.units_per_m), tau);
   if (p.relearn) {
     const MaskOf<F> was_free = (old > F(kFreeShare) * tau) & (old - observed > F(kFreeShare) * tau);
     const MaskOf<F> was_surface = old < F(kFreeShare) * tau;
-    const auto forget = [&](MaskOf<F> changed, float factor) {
-      v.weight = select(changed, to_float(to_int(F(factor) * v.weight)), v.weight);
-    };
-    forget(o.band & was_free, kRelearnFactor);
-    forget(o.free & was_surface, kSeenThroughFactor);
+    const F keeps = select(o.band & was_free, F(kRelearnFactor),
+                           select(o.free & was_surface, F(kSeenThroughFactor), one));
+    v.weight = to_float(to_int(keeps * v.weight));
   }
   const F mean = round_nearest(old + (observed - old) / (v.weight + one));
   const F sdf = select(o.band, mean, min_of(max_of(mean, old + one), tau));
-  const F share = one / (v.colour_weight + one);
+  const MaskOf<F> any = o.free | o.band;
+  v.sdf = select(any, sdf, v.sdf);
+  v.weight = select(any, min_of(v.weight + one, F(p.weight_cap)), v.weight);
+  return v;
+}
+
+/// Weighted running mean of the colour of a voxel in the band.                 test: integrate_test
+///
+/// Luminance is rounded to the nearest of 16 bits, chroma up or down by `dither01`: no bias.
+/// @param luma, cb, cr in the units of the voxel
+template <class F>
+STILLMAP_HD VoxelState<F> fused_colour(VoxelState<F> v, const Observation<F>& o, F luma, F cb, F cr,
+                                       const FuseWeights& p, F dither01) {
+  const F one = F(1.0f), share = one / (v.colour_weight + one);
   const auto mixed = [&](F from, F to, F rounding) {
-    return to_float(to_int(from + (to - from) * share + rounding));
+    return select(o.band, to_float(to_int(from + (to - from) * share + rounding)), from);
   };
-  VoxelState<F> out;
-  out.sdf = select(any, sdf, v.sdf);
-  out.weight = select(any, min_of(v.weight + one, cap), v.weight);
-  out.luma = select(o.band, mixed(v.luma, luma, F(0.5f)), v.luma);
-  out.cb = select(o.band, mixed(v.cb, cb, dither01), v.cb);
-  out.cr = select(o.band, mixed(v.cr, cr, dither01), v.cr);
-  out.colour_weight = select(o.band, min_of(v.colour_weight + one, cap), v.colour_weight);
-  return out;
+  v.luma = mixed(v.luma, luma, F(0.5f));
+  v.cb = mixed(v.cb, cb, dither01);
+  v.cr = mixed(v.cr, cr, dither01);
+  v.colour_weight = select(o.band, min_of(v.colour_weight + one, F(p.weight_cap)), v.colour_weight);
+  return v;
 }
 
 /// A number in [0, 1) from voxel and frame: rounds chroma up or down with the right probability, so that

@@ -68,11 +68,14 @@ struct IntegratePass {
     const int32_t i = voxel_index(x, y, z);
     VoxelState<F> state = voxels.load(block, i);
     if (!free_space) o.free = o.free & (state.weight > F(0.0f));
-    const IntOf<F> voxel = voxels.index(i) + IntOf<F>(static_cast<int32_t>(visible.id()) * kBlockVoxels);
-    F luma = F(0.0f), cb = F(0.0f), cr = F(0.0f);
+    state = fused_distance(state, o, weights);
     const bool band = voxels.any(o.band);
-    if (band) voxels.load_colour(colour, o.pixel, luma, cb, cr);
-    state = fused(state, o, luma, cb, cr, weights, band ? dither<F>(voxel, frame) : F(0.0f));
+    if (band) {
+      const IntOf<F> voxel = voxels.index(i) + IntOf<F>(static_cast<int32_t>(visible.id()) * kBlockVoxels);
+      F luma, cb, cr;
+      voxels.load_colour(colour, o.pixel, luma, cb, cr);
+      state = fused_colour(state, o, luma, cb, cr, weights, dither<F>(voxel, frame));
+    }
     voxels.store(block, i, state);
     return {voxels.any((state.sdf < F(static_cast<float>(kSdfMax))) | (state.weight < F(weights.weight_cap))),
             band};

@@ -103,6 +103,12 @@ constexpr Observation<float> band_at(float sdf_m) {
 }
 constexpr VoxelState<float> kUnobserved = {-32768.0f, 0, 0, 0, 128, 128};
 
+/// Distance and colour, as a voxel in the band or in free space gets them.
+VoxelState<float> fused(VoxelState<float> v, const Observation<float>& o, float luma, float cb, float cr,
+                        const FuseWeights& weights, float dither01) {
+  return fused_colour(fused_distance(v, o, weights), o, luma, cb, cr, weights, dither01);
+}
+
 TEST(Fused, TheFirstObservationIsTaken) {
   const auto v = fused(kUnobserved, band_at(0.05f), 12345.0f, 100.0f, 200.0f, kWeights, 0.7f);
   EXPECT_NEAR(v.sdf, 16383.5f, 0.51f);
