@@ -46,6 +46,16 @@ inline int32_t finest_step(const EngineParams& p) {
   return step;
 }
 
+/// Looks after which space is reliably empty.
+/// @param empty_frames frames in mask.empty_s
+inline int32_t empty_looks(const EngineParams& p, int32_t empty_frames) {
+  return std::min(std::max(p.mask.empty_looks, empty_frames), p.integrate.weight_cap);
+}
+/// VisibleGroupPass::first_looks: no turns before it is known whether space is empty.
+inline uint32_t first_looks(const EngineParams& p, int32_t empty_frames) {
+  return static_cast<uint32_t>(std::max(VisibleGroupPass::kFirstLooks, empty_looks(p, empty_frames)));
+}
+
 /// Neighbouring points err together, the more of them the finer the samples.
 inline float correlated_points(const EngineParams& p) {
   const float pixels = static_cast<float>(p.camera.k.width) * static_cast<float>(p.camera.k.height);

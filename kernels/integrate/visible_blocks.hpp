@@ -141,6 +141,9 @@ struct VisibleGroupPass {
   bool dense = true;     ///< free space is stored in voxels (paper III-D)
   uint32_t enough = 64;  ///< looks at a free block without voxels, after which more say nothing new
   float margin_m = 0;    ///< around the view, from which on groups are fetched from the archive
+  static constexpr int32_t kFirstLooks = 4;
+  uint32_t first_looks = kFirstLooks;  ///< at a block without voxels; from then on such blocks take turns
+  int32_t frame = 0;                   ///< counts frames, for the turns
 
   STILLMAP_HD Int3 group_at(uint32_t index) const {
     const int32_t i = static_cast<int32_t>(index);
@@ -186,6 +189,7 @@ struct VisibleGroupPass {
     const CubeGeometry cube = cube_geometry(kBlockEdge, map.voxel_m);
     const Int3 block = block_in_group(at, bit);
     const BlockRef ref = has_id(group.ref) ? map.groups[group.ref].block[bit] : group.ref;
+    if (has_id(group.ref) && rests(block, ref)) return;
     BlockView seen = group.whole == BlockView::free ? group.whole : look(block, cube);
     if (seen > BlockView::free) seen = look_closely(block, seen, voxels);
     if (seen != BlockView::nothing) add(1ull << bit, seen, block, ref, voxels, view);
@@ -201,6 +205,13 @@ struct VisibleGroupPass {
  private:
   STILLMAP_HD CubeGeometry group_cube() const { return cube_geometry(kGroupEdge * kBlockEdge, map.voxel_m); }
   STILLMAP_HD bool settled(BlockRef ref) const { return is_free(ref) && payload(ref) >= enough; }
+  /// Blocks without voxels that were looked at a few times take turns: hardly anything is new about them, and
+  /// every look goes over all their voxels. A surface that comes there waits for three frames at most.
+  STILLMAP_HD bool rests(Int3 block, BlockRef ref) const {
+    constexpr int32_t kTurns = 4;
+    const uint32_t looks = is_free(ref) ? payload(ref) : is_partly(ref) ? map.partly[payload(ref)].looks : 0u;
+    return looks >= first_looks && ((block.x + block.y + block.z + frame) & (kTurns - 1)) != 0;
+  }
 
   template <class Voxels>
   STILLMAP_HD void add(uint64_t flag, BlockView seen, Int3 block, BlockRef ref, const Voxels& voxels,

@@ -380,14 +380,13 @@ void CpuEngine::mask_by_parts(const Se3& T_map_cam) {
   track.k = cells.k;
   set_kernel(params_, 2, track.weights);
   const MaskParams& p = params_.mask;
-  const CellEvidencePass evidence{
-      cells,
-      track,
-      noise,
-      p.contradict_m,
-      p.contradict_sigmas,
-      std::min(std::max(p.empty_looks, frames_in(p.empty_s)), params_.integrate.weight_cap),
-      static_cast<int32_t>(std::lround(p.empty_reach_m / params_.map.voxel_m))};
+  const CellEvidencePass evidence{cells,
+                                  track,
+                                  noise,
+                                  p.contradict_m,
+                                  p.contradict_sigmas,
+                                  empty_looks(params_, frames_in(p.empty_s)),
+                                  static_cast<int32_t>(std::lround(p.empty_reach_m / params_.map.voxel_m))};
   in_row_tiles(cells.depth_m.rows,
                [&](int32_t first, int32_t last) { loops_.cell_evidence(evidence, first, last); });
   const StillPass still{cells, memory_.before, inverse(T_before_) * T_map_cam, noise, reabsorb_frames() / 2};
@@ -574,7 +573,9 @@ VisibleGroupPass CpuEngine::visible_pass(const Se3& T_map_cam, const FrameGeomet
           params_.integrate.free_space,
           dense(),
           static_cast<uint32_t>(params_.integrate.weight_cap),
-          params_.fetch_m};
+          params_.fetch_m,
+          first_looks(params_, frames_in(params_.mask.empty_s)),
+          frames_};
 }
 
 /// What is known of the groups around the view, and which blocks of them the frame says something of.

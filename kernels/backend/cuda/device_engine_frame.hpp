@@ -304,7 +304,7 @@ bool DeviceEngine<Device>::find_parts(const Se3& T_map_cam) {
                     noise,
                     p.contradict_m,
                     p.contradict_sigmas,
-                    std::min(std::max(p.empty_looks, frames_in(p.empty_s)), params_.integrate.weight_cap),
+                    empty_looks(params_, frames_in(p.empty_s)),
                     static_cast<int32_t>(std::lround(p.empty_reach_m / params_.map.voxel_m))};
   state.still = {cells, d_.before, inverse(T_before_) * T_map_cam, noise, reabsorb_frames() / 2};
   if (!play(DeviceStep::evidence)) return false;
@@ -402,7 +402,9 @@ void DeviceEngine<Device>::set_view(const FrameImages& images, const Se3& T_map_
                     params_.integrate.free_space,
                     dense(),
                     static_cast<uint32_t>(params_.integrate.weight_cap),
-                    params_.fetch_m};
+                    params_.fetch_m,
+                    first_looks(params_, frames_in(params_.mask.empty_s)),
+                    frames_};
   update.fuse = {d_.map.view,
                  geometry,
                  images.luma_chroma.data,

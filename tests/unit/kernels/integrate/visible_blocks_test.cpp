@@ -204,6 +204,54 @@ TEST(VisibleBlocks, WhatIsFreeForGoodIsNotListedAgain) {
   EXPECT_EQ(listed_free(false), 0);
 }
 
+TEST(VisibleBlocks, KnownBlocksWithoutVoxelsTakeTurns) {
+  RandomFrame frame(12);
+  frame.pass.dense = false;
+  frame.pass.first_looks = 3;
+  const auto count = static_cast<uint32_t>(frame.pass.groups.x * frame.pass.groups.y * frame.pass.groups.z);
+  const auto told = [](const GroupView& view) { return view.free | view.partly; };
+  for (uint32_t look = 0; look < frame.pass.first_looks; ++look)
+    for (uint32_t g = 0; g < count; ++g) {
+      const GroupView view = best_loops().visible_group(frame.pass, g);
+      for (uint64_t bits = told(view); bits; bits &= bits - 1) {
+        const int32_t bit = __builtin_ctzll(bits);
+        const Int3 block = frame.pass.block_at(g, bit);
+        if (view.free >> bit & 1)
+          frame.map.storage.see_free(block);
+        else
+          frame.map.storage.see_partly(block);
+      }
+    }
+  VisibleGroupPass always = frame.pass;
+  always.first_looks = 1000;
+  int32_t free = 0, partly = 0, turns = 0;
+  for (uint32_t g = 0; g < count; ++g) {
+    const GroupView all = best_loops().visible_group(always, g);
+    if (!has_id(frame.pass.map.table.find(pack(frame.pass.group_at(g))))) continue;
+    int32_t times[kGroupBlocks] = {};
+    for (frame.pass.frame = 0; frame.pass.frame < 4; ++frame.pass.frame) {
+      const GroupView view = best_loops().visible_group(frame.pass, g);
+      EXPECT_EQ(view.mixed & ~all.mixed, 0u);
+      for (int32_t bit = 0; bit < kGroupBlocks; ++bit)
+        times[bit] += static_cast<int32_t>(told(view) >> bit & 1);
+    }
+    for (int32_t bit = 0; bit < kGroupBlocks; ++bit) {
+      const BlockRef ref = frame.pass.map.ref_of(frame.pass.block_at(g, bit));
+      const uint32_t looks = is_free(ref)     ? payload(ref)
+                             : is_partly(ref) ? frame.pass.map.partly[payload(ref)].looks
+                                              : 0;
+      const int32_t in_turn = looks < frame.pass.first_looks ? 4 : 1;
+      EXPECT_EQ(times[bit], told(all) >> bit & 1 ? in_turn : 0) << "group " << g << " block " << bit;
+      turns += in_turn == 1;
+    }
+    free += __builtin_popcountll(all.free);
+    partly += __builtin_popcountll(all.partly);
+  }
+  EXPECT_GT(free, 100);
+  EXPECT_GT(partly, 50);
+  EXPECT_GT(turns, 150);
+}
+
 TEST(VisibleBlocks, AGroupInTheArchiveIsWantedAndNothingIsListedInIt) {
   RandomFrame frame(12);
   const auto count = static_cast<uint32_t>(frame.pass.groups.x * frame.pass.groups.y * frame.pass.groups.z);
