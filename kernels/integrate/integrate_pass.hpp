@@ -104,12 +104,17 @@ struct IntegratePass {
   STILLMAP_HD void mark_seen(SeenVoxels& seen, const Voxels& voxels) const {
     using F = typename Voxels::Number;
     const VoxelGrid grid(T_cam_map, unpack(seen.key), map.voxel_m);
-    for (int32_t z = 0; z < kBlockEdge; ++z)
+    seen.grew = false;
+    for (int32_t z = 0; z < kBlockEdge; ++z) {
+      uint64_t free = 0;
       for (int32_t y = 0; y < kBlockEdge; ++y)
         for (int32_t x = 0; x < kBlockEdge; x += Voxels::kCount) {
           const Observation<F> o = observe(geometry, grid.position<F>(voxels.ramp(x), y, z));
-          seen.layer[z] |= static_cast<uint64_t>(voxels.bits(o.free)) << (kBlockEdge * y + x);
+          free |= static_cast<uint64_t>(voxels.bits(o.free)) << (kBlockEdge * y + x);
         }
+      seen.grew |= (free & ~seen.layer[z]) != 0;
+      seen.layer[z] |= free;
+    }
   }
 };
 

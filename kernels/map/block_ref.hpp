@@ -67,8 +67,9 @@ STILLMAP_HD Int3 block_in_group(Int3 group, int32_t index) {
 /// Of a block without voxels: which of them were seen free. A bit a voxel, x + 8 y in word z.
 struct SeenVoxels {
   uint64_t layer[kBlockEdge];
-  BlockKey key;    ///< of the block; kEmptyKey: not in use
-  uint32_t looks;  ///< frames that saw some of it
+  BlockKey key;      ///< of the block; kEmptyKey: not in use
+  uint32_t looks;    ///< frames that saw some of it
+  bool grew = true;  ///< the last look at it added some
 
   STILLMAP_HD bool has(int32_t voxel) const { return (layer[voxel >> 6] >> (voxel & 63) & 1) != 0; }
   STILLMAP_HD bool all() const {

@@ -309,6 +309,7 @@ void MapStorage::read_block(const GroupRecordHead& head, int32_t index, const ui
     std::memcpy(seen.layer, from, kSeenBytes);
     seen.key = key;
     seen.looks = head.looks[index];
+    seen.grew = true;
     ref = kPartlyRef | id;
   }
   from += payload_bytes(kind);

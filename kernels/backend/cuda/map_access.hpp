@@ -224,6 +224,7 @@ struct ReadGroupKernel {
       const uint32_t id = map.view.partly_pool.take();
       map.view.partly[id].key = key;
       map.view.partly[id].looks = head.looks[i];
+      map.view.partly[id].grew = true;
       return kPartlyRef | id;
     }
     return kind == BlockKind::free ? free_ref(head.looks[i]) : kNoBlock;

@@ -652,6 +652,10 @@ struct FuseKernel {
     SeenVoxels& seen = map.view.partly[id];
     auto* words = reinterpret_cast<uint32_t*>(seen.layer);
     const VoxelGrid grid(pass.T_cam_map, unpack(seen.key), map.view.voxel_m);
+    // Words that are not full yet, and above them words that grew.
+    constexpr uint32_t kGrew = 1u << 16;
+    PerLane<Block, uint32_t> words_that;
+    block.each([&](uint32_t lane) { words_that[lane] = 0; });
     for (uint32_t first = 0; first < static_cast<uint32_t>(kBlockVoxels); first += kLanes) {
       PerLane<Block, uint32_t> free;
       block.privately([&](uint32_t lane) {
@@ -662,14 +666,20 @@ struct FuseKernel {
       });
       const PerLane<Block, uint32_t> bits = block.ballot(free);
       block.each([&](uint32_t lane) {
-        if (lane % kWarp == 0) words[(first + lane) / kWarp] |= bits[lane];
+        if (lane % kWarp != 0) return;
+        uint32_t& word = words[(first + lane) / kWarp];
+        if (bits[lane] & ~word) words_that[lane] += kGrew;
+        word |= bits[lane];
       });
     }
-    PerLane<Block, uint32_t> holes;
     block.privately([&](uint32_t lane) {
-      holes[lane] = lane < kBlockVoxels / kWarp ? static_cast<uint32_t>(words[lane] != ~0u) : 0u;
+      if (lane < kBlockVoxels / kWarp && words[lane] != ~0u) ++words_that[lane];
     });
-    const bool complete = sum_over_block(block, holes, block.shared().complete) == 0;
+    const uint32_t all = sum_over_block(block, words_that, block.shared().complete);
+    block.each([&](uint32_t lane) {
+      if (lane == 0) seen.grew = all >= kGrew;
+    });
+    const bool complete = (all & (kGrew - 1)) == 0;
     return complete ? outcome_detail::kPartlyIsFree | seen.looks << 8 : outcome_detail::kStays;
   }
 };
@@ -799,6 +809,7 @@ struct MergeBlocksKernel {
     }
     map.view.partly[record].key = key;
     map.view.partly[record].looks = enough_looks;
+    map.view.partly[record].grew = true;
     map.ref_in_group(unpack(key)) = kPartlyRef | record;
   }
 };
