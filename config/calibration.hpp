@@ -19,18 +19,24 @@ struct DepthCamera {
   Se3d T_colour_depth;  ///< points of the depth camera into the colour camera, both optical; metres
 };
 
+// clang-format off
 /// What is known of a pair of cameras. In a file (TOML):
 ///
 ///     depth_scale = 1000.0          # raw depth units in a metre
-///     depth_bias = [0.0, 1.0]       # true = c0 + c1 m + c2 m^2 + c3 m^3, m what is measured, in metres; 1
-///     to 4 [colour]                      # to which depth is registered; without the heading these keys
-///     stand alone width = 640                   # pixels; may be left out height = 480 fx = 525.0 # pixels;
-///     the centre of the top-left pixel is (0, 0) fy = 525.0 cx = 319.5 cy = 239.5 distortion = [0.0, 0.0,
-///     0.0, 0.0, 0.0]      # k1 k2 p1 p2 k3, Brown-Conrady in OpenCV's order [depth]                       #
-///     only for a source whose depth is not registered to colour; keys as [colour] T_colour_depth = [-0.025,
-///     0.0, 0.0, 0.0, 0.0, 0.0, 1.0]     # place in m, unit quaternion x y z w
+///     depth_bias = [0.0, 1.0]       # true = c0 + c1 m + c2 m^2 + c3 m^3, m what is measured, in metres; 1 to 4
+///     [colour]                      # to which depth is registered; without the heading these keys stand alone
+///     width = 640                   # pixels; may be left out
+///     height = 480
+///     fx = 525.0                    # pixels; the centre of the top-left pixel is (0, 0)
+///     fy = 525.0
+///     cx = 319.5
+///     cy = 239.5
+///     distortion = [0.0, 0.0, 0.0, 0.0, 0.0]      # k1 k2 p1 p2 k3, Brown-Conrady in OpenCV's order
+///     [depth]                       # only for a source whose depth is not registered to colour; keys as [colour]
+///     T_colour_depth = [-0.025, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]     # place in m, unit quaternion x y z w
 ///
 /// All of it may be left out.
+// clang-format on
 struct Calibration {
   std::optional<CameraModel> colour;  ///< width and height 0 where the file does not say
   std::optional<DepthCamera> depth;   ///< none: it is registered to colour
