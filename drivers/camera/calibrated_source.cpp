@@ -23,6 +23,8 @@ Result<std::unique_ptr<FrameSource>> CalibratedSource::make(std::unique_ptr<Fram
                  ErrorKind::bad_usage};
   made->registration_.emplace(*depth_camera, info.camera, info.depth_units_per_m);
   made->depth_.resize(static_cast<size_t>(k.width) * static_cast<size_t>(k.height));
+  info.registration_bytes =
+      DepthRegistration::bytes(k.height, k.width) + made->depth_.size() * sizeof(made->depth_[0]);
   return std::unique_ptr<FrameSource>(std::move(made));
 }
 

@@ -48,6 +48,7 @@ struct SourceInfo {
   DepthBias depth_bias = {};                     ///< of the raw depth
   std::optional<DepthCamera> depth_camera = {};  ///< of depth that is still to be registered to colour; none:
                                                  ///< it is
+  uint64_t registration_bytes = 0;               ///< of registering it, taken when the source was opened
   int64_t frames = -1;                           ///< number of frames, -1: unknown (live)
   bool has_truth_mask = false;
 };

@@ -46,6 +46,7 @@ TEST(CalibratedSource, RegistersWhatIsNotRegistered) {
   auto source = CalibratedSource::make(std::make_unique<WallSource>(), {}, to_the_left());
   ASSERT_TRUE(source) << source.error();
   EXPECT_FALSE((*source)->info().depth_camera) << "what comes out is registered";
+  EXPECT_EQ((*source)->info().registration_bytes, 64u * 48 * (3 * sizeof(float) + sizeof(uint16_t)));
   test::FrameMemory memory((*source)->info());
   const uint16_t* const pixels = memory.frame.depth_raw.data;
   ASSERT_EQ((*source)->next(memory.frame, 0), Status::ok);
