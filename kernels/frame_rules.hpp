@@ -9,6 +9,7 @@
 #include "kernels/engine.hpp"
 #include "kernels/integrate/visible_blocks.hpp"
 #include "kernels/map/block_ref.hpp"
+#include "kernels/mask/cells.hpp"
 #include "kernels/track/track_pass.hpp"
 
 namespace stillmap {
@@ -102,6 +103,25 @@ inline TrackPass track_pass_at(const EngineParams& params, const VolumeView& map
   const TrackParams& p = params.track;
   pass.weights = {map.sdf_unit_m(), 1.0f / params.map.voxel_m, p.colour_weight, p.inlier_m, p.kernel};
   return pass;
+}
+
+/// What the cells are compared with at a pose.
+/// @param map of the engine's memory  @param empty_frames frames in mask.empty_s
+inline CellEvidencePass evidence_pass(const EngineParams& params, const VolumeView& map,
+                                      const CellGrid& cells, const Se3& T_map_cam, const DepthNoise& noise,
+                                      int32_t empty_frames) {
+  constexpr int32_t kCoarsest = 2;
+  TrackPass track = track_pass_at(params, map, T_map_cam);
+  track.k = cells.k;
+  set_kernel(params, kCoarsest, track.weights);
+  const MaskParams& p = params.mask;
+  return {cells,
+          track,
+          noise,
+          p.contradict_m,
+          p.contradict_sigmas,
+          empty_looks(params, empty_frames),
+          static_cast<int32_t>(std::lround(p.empty_reach_m / params.map.voxel_m))};
 }
 
 /// The pose of the camera after an increment about its centre (see TrackPass).

@@ -376,17 +376,8 @@ void CpuEngine::mask_by_parts(const Se3& T_map_cam) {
   CellGrid& cells = memory_.cells;
   cells.settled_frames = params_.mask.reabsorb_s > 0 ? reabsorb_frames() : 0;
   const DepthNoise noise = depth_noise(params_.depth, k());
-  TrackPass track = track_pass(T_map_cam);
-  track.k = cells.k;
-  set_kernel(params_, 2, track.weights);
-  const MaskParams& p = params_.mask;
-  const CellEvidencePass evidence{cells,
-                                  track,
-                                  noise,
-                                  p.contradict_m,
-                                  p.contradict_sigmas,
-                                  empty_looks(params_, frames_in(p.empty_s)),
-                                  static_cast<int32_t>(std::lround(p.empty_reach_m / params_.map.voxel_m))};
+  const CellEvidencePass evidence =
+      evidence_pass(params_, memory_.map.view(), cells, T_map_cam, noise, frames_in(params_.mask.empty_s));
   in_row_tiles(cells.depth_m.rows,
                [&](int32_t first, int32_t last) { loops_.cell_evidence(evidence, first, last); });
   const StillPass still{cells, memory_.before, inverse(T_before_) * T_map_cam, noise, reabsorb_frames() / 2};

@@ -103,7 +103,8 @@ struct PointBatch {
   /// The voxels around each pixel. Those that were kept; of the others first where they lie, so that the
   /// memory can be on its way, then those in one block, at last those across blocks: each loop does the same
   /// for every pixel.
-  /// @param entry of the first pixel in `kept`, @param stride from one to the next
+  /// @param kept_cell, kept_corners KeptCorners, from the entry of the first pixel on  @param stride entries
+  /// from one pixel to the next
   void fetch(const TrackPass& pass, int32_t count, TrackBlocks& cache, uint64_t* kept_cell,
              KeptCorners::Corners* kept_corners, int32_t stride) {
     const VoxelSurface* from[kBatch];

@@ -295,17 +295,8 @@ bool DeviceEngine<Device>::find_parts(const Se3& T_map_cam) {
   const MaskParams& p = params_.mask;
   CellGrid cells = d_.cells.grid;
   cells.settled_frames = p.reabsorb_s > 0 ? reabsorb_frames() : 0;
-  TrackPass track = track_pass_at(params_, d_.map.view, T_map_cam);
-  track.k = cells.k;
-  set_kernel(params_, 2, track.weights);
   DeviceStates::Evidence& state = h_.states->evidence;
-  state.evidence = {cells,
-                    track,
-                    noise,
-                    p.contradict_m,
-                    p.contradict_sigmas,
-                    empty_looks(params_, frames_in(p.empty_s)),
-                    static_cast<int32_t>(std::lround(p.empty_reach_m / params_.map.voxel_m))};
+  state.evidence = evidence_pass(params_, d_.map.view, cells, T_map_cam, noise, frames_in(p.empty_s));
   state.still = {cells, d_.before, inverse(T_before_) * T_map_cam, noise, reabsorb_frames() / 2};
   if (!play(DeviceStep::evidence)) return false;
   CellGrid& found = h_.cells.grid;
