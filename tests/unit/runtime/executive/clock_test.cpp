@@ -11,7 +11,7 @@ constexpr int64_t kSecond_ns = 1'000'000'000;
 
 TEST(UtcClock, BeginsWithTheWallClock) {
   const UtcClock clock;
-  EXPECT_LT(std::abs(clock.to_utc_us(monotonic_ns()) - wall_ns() / 1000), 1000);
+  EXPECT_LT(std::abs(clock.to_utc_us(monotonic_ns()) - wall_ns() / 1000), 20'000);
 }
 
 TEST(UtcClock, TheWayBackLeadsToTheSameTime) {

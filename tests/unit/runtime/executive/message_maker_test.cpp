@@ -72,7 +72,7 @@ TEST_F(Messages, StampsAreUtcOfTheCapture) {
   const int64_t now_ns = monotonic_ns();
   PublishItem item = at(0, {});
   item.result.captured.ns = now_ns;
-  EXPECT_LT(std::abs(maker().pose(item).utime.us - wall_ns() / 1000), 5000);
+  EXPECT_LT(std::abs(maker().pose(item).utime.us - wall_ns() / 1000), 100'000);
 }
 
 TEST_F(Messages, AStatusCarriesTheFrameAndTheCounters) {
