@@ -71,6 +71,9 @@ struct TrackParams {
   float damping_down = 0.1f;
   float converged_m = 1e-4f;
   float converged_rad = 1e-4f;
+  float settled_m = 0.002f;
+  float settled_rad = 0.002f;
+  float settled_cost = 0.0003f;
   MotionPrior prior = MotionPrior::constant_velocity;
   float prior_point_m = 0.03f;
   float prior_gain = 0.5f;
@@ -125,6 +128,12 @@ struct TrackParams {
     f("converged_m", &P::converged_m, 0, 0.1, "m", "ours",
       "a level ends when a step translates and rotates less");
     f("converged_rad", &P::converged_rad, 0, 0.1, "rad", "ours", "see converged_m");
+    f("settled_m", &P::settled_m, 0, 0.1, "m", "ours",
+      "a shorter step that does not lower the cost ends its level, and the last one of a level is taken "
+      "without another pass; 0: every step is judged");
+    f("settled_rad", &P::settled_rad, 0, 0.1, "rad", "ours", "see settled_m");
+    f("settled_cost", &P::settled_cost, 0, 1.0, "1", "ours",
+      "share of the cost by which such a step may raise it and is taken all the same");
     f("prior", &P::prior, 0, 2, "last_pose|constant_velocity|odometry", "ours",
       "where the registration starts; odometry: constant velocity while it is stale");
     f("prior_point_m", &P::prior_point_m, 0, 1.0, "m", "ours",

@@ -66,8 +66,10 @@ STILLMAP_HD double mean_cost(const NormalEq& sums) {
 }
 
 /// A step must lower the mean cost and may not do so by leaving the mapped space.
-STILLMAP_HD bool better(const NormalEq& candidate, const NormalEq& current) {
-  return candidate.sum[kPoints] >= 0.8 * current.sum[kPoints] && mean_cost(candidate) < mean_cost(current);
+/// @param worse share of the cost by which it may rise all the same
+STILLMAP_HD bool better(const NormalEq& candidate, const NormalEq& current, double worse = 0) {
+  return candidate.sum[kPoints] >= 0.8 * current.sum[kPoints] &&
+         mean_cost(candidate) < (1 + worse) * mean_cost(current);
 }
 
 }  // namespace pose_search_detail
@@ -76,7 +78,7 @@ STILLMAP_HD bool better(const NormalEq& candidate, const NormalEq& current) {
 struct PoseSearch {
   Se3 T_map_cam;  ///< best so far
   Se3 T_try;      ///< the next pass is wanted here
-  NormalEq sums;  ///< of the pass at T_map_cam
+  NormalEq sums;  ///< of the pass at T_map_cam, or less than a settled step away from it
   double damping = 0;
   double step_m = 0, step_rad = 0;  ///< of the step to T_try
   int32_t iterations = 0;           ///< steps tried, all levels
@@ -122,19 +124,35 @@ struct PoseSearch {
     T_try = step.T_map_cam;
     step_m = step.translation_m;
     step_rad = step.rotation_rad;
+    if (settled(p) && (steps_left == 0 || small(p))) take_unseen(p);
   }
 
  private:
+  STILLMAP_HD bool small(const TrackParams& p) const {
+    return step_m < static_cast<double>(p.converged_m) && step_rad < static_cast<double>(p.converged_rad);
+  }
+  /// The points that come and go with a step this short change the mean cost by more than the step does: what
+  /// the cost says of it is noise, the step itself is the sum of all points.
+  STILLMAP_HD bool settled(const TrackParams& p) const {
+    return step_m < static_cast<double>(p.settled_m) && step_rad < static_cast<double>(p.settled_rad);
+  }
+  STILLMAP_HD void take_unseen(const TrackParams& p) {
+    T_map_cam = T_try;
+    converged = small(p);
+    level_done = true;
+  }
   STILLMAP_HD void judge(const NormalEq& candidate, const TrackParams& p) {
-    const bool accepted = pose_search_detail::better(candidate, sums);
+    using pose_search_detail::better;
+    const bool lower = better(candidate, sums);
+    const bool accepted =
+        lower || (settled(p) && better(candidate, sums, static_cast<double>(p.settled_cost)));
     damping *= static_cast<double>(accepted ? p.damping_down : p.damping_up);
     if (accepted) {
       T_map_cam = T_try;
       sums = candidate;
     }
-    converged =
-        step_m < static_cast<double>(p.converged_m) && step_rad < static_cast<double>(p.converged_rad);
-    level_done = converged;
+    converged = small(p);
+    level_done = converged || (!lower && settled(p));
   }
 };
 

@@ -519,6 +519,7 @@ TEST(RegisterFrame, AcceptsAStepThatLowersTheCost) {
 
 TEST(RegisterFrame, AStepThatRaisesTheCostIsNotTakenAndTheNextIsShorter) {
   TrackParams params = one_level(4);
+  params.settled_m = 0;  // each is judged
   params.damping_initial = 1.0f;
   params.converged_m = 0;
   Script script{{1.0, 1.1, 2.0, 1.0, 1.5}};  // an equal cost is no gain either
@@ -586,6 +587,34 @@ TEST(RegisterFrame, ASmallStepEndsALevel) {
   const TrackResult result = script.run(one_level(2));
   EXPECT_EQ(result.iterations, 1);
   EXPECT_TRUE(result.converged);
+}
+
+// Steps of 1 mm, of which every one is taken for settled.
+TEST(RegisterFrame, ASettledStepThatDoesNotLowerTheCostEndsItsLevel) {
+  TrackParams params = one_level(5);
+  params.damping_initial = 0;
+  params.settled_cost = 1e-3f;
+  Script a_little_worse{{1.0, 0.5, 0.5004, 0.1}, {}, 1e-3};
+  EXPECT_NEAR(a_little_worse.run(params).T_world_cam.translation.x, -2e-3f, 1e-6f);
+  EXPECT_EQ(a_little_worse.asked.size(), 3u);
+  Script worse{{1.0, 0.5, 0.502, 0.1}, {}, 1e-3};
+  EXPECT_NEAR(worse.run(params).T_world_cam.translation.x, -1e-3f, 1e-6f);
+  EXPECT_EQ(worse.asked.size(), 3u);
+  Script off_the_map{{1.0, 0.5, 0.4, 0.1}, {1000, 1000, 700, 1000}, 1e-3};
+  EXPECT_NEAR(off_the_map.run(params).T_world_cam.translation.x, -1e-3f, 1e-6f);
+  EXPECT_EQ(off_the_map.asked.size(), 3u);
+}
+
+TEST(RegisterFrame, TheLastSettledStepIsTakenWithoutAPass) {
+  TrackParams params = one_level(2);
+  params.damping_initial = 0;
+  Script script{{1.0, 0.5}, {}, 1e-3};
+  EXPECT_NEAR(script.run(params).T_world_cam.translation.x, -2e-3f, 1e-6f);
+  EXPECT_EQ(script.asked.size(), 2u);
+  params.settled_rad = 0;  // off
+  Script judged{{1.0, 0.5, 0.6}, {}, 1e-3};
+  EXPECT_NEAR(judged.run(params).T_world_cam.translation.x, -1e-3f, 1e-6f);
+  EXPECT_EQ(judged.asked.size(), 3u);
 }
 
 TEST(RegisterFrame, LevelsGoFromCoarseToFine) {
