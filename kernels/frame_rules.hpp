@@ -9,14 +9,12 @@
 #include "kernels/engine.hpp"
 #include "kernels/integrate/visible_blocks.hpp"
 #include "kernels/map/block_ref.hpp"
-#include "kernels/mask/cells.hpp"
+#include "kernels/mask/slide.hpp"
 #include "kernels/track/track_pass.hpp"
 
 namespace stillmap {
 
 constexpr int32_t kLongestStep = 4;  ///< of the finest level; that of the coarsest is four times as long
-/// Frames kept to see what slides; the oldest is mask.reabsorb_s old, or a third more.
-constexpr int32_t kEarlier = 4;
 
 /// A length or count of 640x480 pixels, scaled to the image.
 inline int32_t scaled_px(int32_t px_at_640, int32_t width) {

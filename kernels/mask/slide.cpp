@@ -1,5 +1,6 @@
 #include "kernels/mask/slide.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace stillmap {
@@ -77,10 +78,78 @@ void add_cell(const CellGrid& cells, int32_t r, int32_t c, const EarlierCells& e
   slide.add(gradient, luma.value - cells.luma.at(r, c) * (1.0f / kLumaScale), kLumaSigma);
 }
 
+// The least squares above see no farther than the pattern is smooth: what slid by more than the width of a
+// stripe seems to have stayed, with a few cells that do not fit. Then some of them are tried at other places.
+constexpr int32_t kFarthestCells = 8, kShiftCells = 2;  ///< places tried, along the picture
+constexpr int32_t kMostAsked = 400;                     ///< cells of a part, every so manieth of it
+constexpr float kMisfitLuma = 0.04f;                    ///< where half of a misfit is reached
+constexpr float kBetterShare = 0.75f;                   ///< of the misfit in place is left elsewhere
+constexpr float kBetterCells = 8.0f;                    ///< that fit elsewhere and not in place
+
+/// Cells of a part, where they would be in an earlier frame had they stayed.
+struct AskedCells {
+  struct Cell {
+    Pixel at;
+    float z_m, luma;
+  } cell[kMostAsked];
+  int32_t count = 0;
+};
+
+void ask_cells(const CellGrid& cells, int32_t i, const Part& part, const Se3& T_earlier_now,
+               AskedCells& asked) {
+  const int32_t every = 1 + part.cells / kMostAsked;
+  int32_t met = 0;
+  for_cells_of(cells, i, part, [&](int32_t r, int32_t c) {
+    if (met++ % every != 0 || asked.count == kMostAsked) return;
+    const Vec3 p = T_earlier_now * cells.point(r, c);
+    if (p.z < kNearestM) return;
+    asked.cell[asked.count++] = {project(cells.k, p), p.z, cells.luma.at(r, c) * (1.0f / kLumaScale)};
+  });
+}
+
+/// Cells whose brightness the earlier frame does not show, 0 to 1 each.
+struct Misfit {
+  float sum = 0, cells = 0;
+  float mean() const { return sum / std::max(cells, 1.0f); }
+};
+
+/// @param right, down where the cells are looked for, from where they would be, in cells
+Misfit misfit_at(const AskedCells& asked, const EarlierCells& earlier, int32_t right, int32_t down) {
+  Misfit misfit;
+  for (int32_t i = 0; i < asked.count; ++i) {
+    const AskedCells::Cell& cell = asked.cell[i];
+    const Pixel there = {cell.at.u + static_cast<float>(right), cell.at.v + static_cast<float>(down)};
+    const LumaAt luma = luma_at(earlier, there, cell.z_m);
+    if (!luma.known) continue;
+    const float error = (luma.value - cell.luma) / kMisfitLuma;
+    misfit.sum += error * error / (1.0f + error * error);
+    misfit.cells += 1.0f;
+  }
+  return misfit;
+}
+
+bool fits_elsewhere(const CellGrid& cells, int32_t i, const Part& part, const EarlierCells& earlier,
+                    const Se3& T_earlier_now) {
+  AskedCells asked;
+  ask_cells(cells, i, part, T_earlier_now, asked);
+  const Misfit here = misfit_at(asked, earlier, 0, 0);
+  if (here.sum < kBetterCells) return false;
+  for (int32_t down = -kFarthestCells; down <= kFarthestCells; down += kShiftCells)
+    for (int32_t right = -kFarthestCells; right <= kFarthestCells; right += kShiftCells) {
+      const Misfit there = misfit_at(asked, earlier, right, down);
+      if (2.0f * there.cells > here.cells && there.mean() < kBetterShare * here.mean() &&
+          (here.mean() - there.mean()) * here.cells > kBetterCells)
+        return true;
+    }
+  return false;
+}
+
 }  // namespace
 
 void restart_sliding(const CellGrid& cells, int32_t parts, const PartMemory& memory, const MaskParams& params,
-                     const DepthNoise& noise, const EarlierCells& earlier, const Se3& T_earlier_now) {
+                     const DepthNoise& noise, const EarlierCells& earlier, const Se3& T_earlier_now,
+                     int32_t frames) {
+  const int32_t most = std::max(0, std::min(frames, cells.settled_frames - 1));
   for (int32_t i = 0; i < parts; ++i) {
     Part& part = memory.parts[static_cast<uint32_t>(i)];
     const bool fits = part.contradicts_m2 < params.blob_m2 && part.moved_m <= may_move_m(part, params);
@@ -88,9 +157,23 @@ void restart_sliding(const CellGrid& cells, int32_t parts, const PartMemory& mem
     Slide slide;
     for_cells_of(cells, i, part,
                  [&](int32_t r, int32_t c) { add_cell(cells, r, c, earlier, T_earlier_now, noise, slide); });
-    if (slide.solved_m() <= may_move_m(part, params)) continue;
-    for_cells_of(cells, i, part, [&](int32_t r, int32_t c) { cells.still.at(r, c) = 0; });
+    if (slide.solved_m() <= may_move_m(part, params) &&
+        !fits_elsewhere(cells, i, part, earlier, T_earlier_now))
+      continue;
+    for_cells_of(cells, i, part, [&](int32_t r, int32_t c) {
+      cells.still.at(r, c) = std::min(cells.still.at(r, c), static_cast<uint16_t>(most));
+    });
     part.settled = 0;
+  }
+}
+
+void restart_sliding(const CellGrid& cells, int32_t parts, const PartMemory& memory, const MaskParams& params,
+                     const DepthNoise& noise, const EarlierFrames& earlier, const Se3& T_map_now) {
+  int32_t frames = 0;
+  for (int32_t later = kEarlier - 1; later > 0; --later) {
+    const EarlierCells& then = earlier.at(later);
+    restart_sliding(cells, parts, memory, params, noise, then, inverse(then.T_map_cam) * T_map_now, frames);
+    frames = earlier.age(later);
   }
 }
 

@@ -14,11 +14,37 @@ struct EarlierCells {
   Se3 T_map_cam;
 };
 
+/// Frames that are kept; the oldest is mask.reabsorb_s old, or a third more.
+constexpr int32_t kEarlier = 4;
+
+/// The frames that were kept, one of every `masks_between` masks, in a ring.
+struct EarlierFrames {
+  const EarlierCells* ring;  ///< kEarlier of them
+  uint32_t masks = 0;        ///< made before this one
+  uint32_t masks_between = 1;
+
+  /// @param later 1 the oldest, kEarlier - 1 the youngest of which all is kept
+  const EarlierCells& at(int32_t later) const {
+    return ring[(masks / masks_between + static_cast<uint32_t>(later)) % kEarlier];
+  }
+  int32_t age(int32_t later) const {  ///< masks
+    return static_cast<int32_t>(masks % masks_between) +
+           (kEarlier - later) * static_cast<int32_t>(masks_between);
+  }
+};
+
 /// Where a part that contradicts the map, or lies off it, has slid since `earlier`, its cells do not count as
-/// still: their count starts again (cells.still, Part::settled).    test: slide_test
-/// @param earlier about mask.reabsorb_s ago; @param T_earlier_now pose of this camera in that one's
-/// frame, by the motion that most of the space agrees on
+/// still, or for `frames` at most (cells.still, Part::settled).    test: slide_test
+/// @param T_earlier_now pose of this camera in that one's frame, by the motion that most of the space agrees
+/// on
 void restart_sliding(const CellGrid& cells, int32_t parts, const PartMemory& memory, const MaskParams& params,
-                     const DepthNoise& noise, const EarlierCells& earlier, const Se3& T_earlier_now);
+                     const DepthNoise& noise, const EarlierCells& earlier, const Se3& T_earlier_now,
+                     int32_t frames);
+
+/// The same against each of the frames that were kept, the youngest first: what slid since one of them has
+/// stood still since the next at most. Who swings back to where it was then was elsewhere in between.
+/// @param T_map_now pose of this camera, by the motion that most of the space agrees on
+void restart_sliding(const CellGrid& cells, int32_t parts, const PartMemory& memory, const MaskParams& params,
+                     const DepthNoise& noise, const EarlierFrames& earlier, const Se3& T_map_now);
 
 }  // namespace stillmap

@@ -390,12 +390,8 @@ void CpuEngine::mask_by_parts(const Se3& T_map_cam) {
   gather_parts(cells, parts, memory_.part_memory, noise);
   const Twistd motion = agree_on_motion(parts, memory_.part_memory, params_.mask, usual_);
   const Se3 T_agreed = moved_about_centre(T_map_cam, motion);
-  // Two of them: who swings back to where it was then was elsewhere in between.
-  for (const uint32_t later : {1u, 2u}) {
-    const EarlierCells& earlier = memory_.earlier[(masks_ / masks_between_earlier() + later) % kEarlier];
-    restart_sliding(cells, parts, memory_.part_memory, params_.mask, noise, earlier,
-                    inverse(earlier.T_map_cam) * T_agreed);
-  }
+  restart_sliding(cells, parts, memory_.part_memory, params_.mask, noise,
+                  EarlierFrames{&memory_.earlier[0], masks_, masks_between_earlier()}, T_agreed);
   decide_parts(cells, parts, memory_.part_memory, params_.mask, usual_);
   const DynamicPixelPass pixels{cells, memory_.depth_m, memory_.mask};
   in_row_tiles(k().height, [&](int32_t first, int32_t last) { loops_.dynamic_pixels(pixels, first, last); });

@@ -306,11 +306,8 @@ bool DeviceEngine<Device>::find_parts(const Se3& T_map_cam) {
   gather_parts(found, parts, h_.part_memory, noise);
   const Twistd motion = agree_on_motion(parts, h_.part_memory, p, usual_);
   const Se3 T_agreed = moved_about_centre(T_map_cam, motion);
-  // Two of them: who swings back to where it was then was elsewhere in between.
-  for (const uint32_t later : {1u, 2u}) {
-    const EarlierCells& earlier = h_.earlier[(masks_ / masks_between_earlier() + later) % kEarlier];
-    restart_sliding(found, parts, h_.part_memory, p, noise, earlier, inverse(earlier.T_map_cam) * T_agreed);
-  }
+  restart_sliding(found, parts, h_.part_memory, p, noise,
+                  EarlierFrames{&h_.earlier[0], masks_, masks_between_earlier()}, T_agreed);
   decide_parts(found, parts, h_.part_memory, p, usual_);
   return true;
 }

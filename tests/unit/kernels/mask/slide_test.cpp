@@ -30,12 +30,14 @@ class SlideTest : public PartsTest {
                 y_m = static_cast<float>(r) * kNearM / 80.0f;
     return 20000.0f + 2000.0f * std::sin(20.0f * x_m) * std::cos(20.0f * y_m);
   }
+  /// Three of twenty columns, at uneven distances.
+  static float stripes(int32_t c) { return c % 20 == 3 || c % 20 == 8 || c % 20 == 10 ? 40000.0f : 20000.0f; }
   /// Cells of the box that still count as still.
   int32_t still_after(const Se3& T_earlier_now = {}) {
     const int32_t count = find_parts();
     gather_parts(cells, count, memory, noise);
     agree_on_motion(count, memory, params, usual);
-    restart_sliding(cells, count, memory, params, noise, earlier, T_earlier_now);
+    restart_sliding(cells, count, memory, params, noise, earlier, T_earlier_now, 0);
     int32_t left = 0, settled = 0;
     in(kBox, [&](int32_t r, int32_t c) { left += cells.still.at(r, c) != 0; });
     for (int32_t i = 0; i < count; ++i) settled += memory.parts[static_cast<uint32_t>(i)].settled;
@@ -57,6 +59,18 @@ TEST_F(SlideTest, WhatStayedInItsPlaceStandsStill) {
 TEST_F(SlideTest, AFaceThatSlidAlongItselfDoesNot) {
   earlier_at({0.02f, 0, 0});
   EXPECT_EQ(still_after(), 0);
+}
+
+// By more than its stripes are wide.
+TEST_F(SlideTest, NorOneThatSlidFar) {
+  in(kBox, [&](int32_t r, int32_t c) { cells.luma.at(r, c) = stripes(c); });
+  in(kBox, [&](int32_t r, int32_t c) { earlier.luma.at(r, c) = stripes(c + 5); });
+  EXPECT_EQ(still_after(), 0);
+}
+
+TEST_F(SlideTest, LightThatChangesIsNoSlide) {
+  in(kBox, [&](int32_t r, int32_t c) { earlier.luma.at(r, c) += 3000.0f; });
+  EXPECT_EQ(still_after(), 400);
 }
 
 TEST_F(SlideTest, NorWhatCameNearer) {
@@ -85,6 +99,30 @@ TEST_F(SlideTest, ItIsTheThingThatSlidNotTheCamera) {
 TEST_F(SlideTest, AFrameThatSawNothingSaysNothing) {
   in({0, kRows, 0, kCols}, [&](int32_t r, int32_t c) { earlier.depth_m.at(r, c) = 0; });
   EXPECT_EQ(still_after(), 400);
+}
+
+// Masks 10, 20, 30 and 40 were kept, this one is the 45th after the first; the box stopped after the 23rd.
+TEST_F(SlideTest, WhatSlidBeforeAFrameHasStoodStillSinceThat) {
+  std::vector<EarlierCells> ring(kEarlier, earlier);  // of one picture: the box is where it is now
+  std::vector<float> moved_depth(kRows * kCols), moved_luma(kRows * kCols);
+  earlier_at({0.02f, 0, 0});
+  moved_depth.assign(earlier.depth_m.data, earlier.depth_m.data + kRows * kCols);
+  moved_luma.assign(earlier.luma.data, earlier.luma.data + kRows * kCols);
+  earlier_at({});
+  for (const int32_t slot : {1, 2}) {  // masks 10 and 20
+    ring[static_cast<size_t>(slot)].depth_m.data = moved_depth.data();
+    ring[static_cast<size_t>(slot)].luma.data = moved_luma.data();
+  }
+  const EarlierFrames frames{ring.data(), 45, 10};
+  EXPECT_EQ(frames.age(1), 35);
+  EXPECT_EQ(&frames.at(1), &ring[1]);
+  EXPECT_EQ(&frames.at(3), &ring[3]);
+  const int32_t count = find_parts();
+  gather_parts(cells, count, memory, noise);
+  agree_on_motion(count, memory, params, usual);
+  restart_sliding(cells, count, memory, params, noise, frames, {});
+  in(kBox,
+     [&](int32_t r, int32_t c) { EXPECT_EQ(cells.still.at(r, c), 15); });  // since mask 30, 15 masks ago
 }
 
 }  // namespace
