@@ -262,7 +262,7 @@ struct MapParams {
   float voxel_m = 0.01f;
   float truncation_m = 0.1f;
   FreeSpace free_space = FreeSpace::hierarchical;
-  int32_t pool_blocks = 107000;
+  int32_t pool_blocks = 100000;
   float high_water = 0.98f;
   int32_t mesh_min_weight = 3;
   int32_t mesh_min_surface = 10;

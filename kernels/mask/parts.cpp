@@ -12,7 +12,9 @@ constexpr uint8_t kSet = 255;
 
 constexpr float kJoinedM = 0.02f;    ///< neighbouring cells this near in depth are one surface, without noise
 constexpr float kOnePlaneM = 0.01f;  ///< and so are cells this near to each other's plane
-constexpr float kSettledShare = 0.6f;      ///< of a part that stands still: the rest is its rim
+constexpr float kSettledShare = 0.6f;  ///< of a part that stands still: the rest is its rim
+constexpr float kStillMovesShare =
+    0.6f;  ///< of the offset that shows a mover keeps it one: it may swing back
 constexpr float kHardlyKnownShare = 0.2f;  ///< of a part: the map knows too little to say what it is
 constexpr double kNearShare =
     0.5;  ///< of a part must lie near a mapped surface, that it can have moved from it
@@ -352,7 +354,7 @@ void decide(Part& part, const MaskParams& params, float usual, bool believe_move
   const float limit = was && !hardly_known ? params.share_off : params.share_on;
   const bool contradicts = part.contradicts_m2 >= params.blob_m2 && share > limit;
   const bool stands = static_cast<float>(part.settled) > kSettledShare * static_cast<float>(part.cells);
-  part.moved = !stands && believe_moves && has_moved(part, params, usual);
+  part.moved = !stands && believe_moves && has_moved(part, params, was ? kStillMovesShare * usual : usual);
   // Where the map cannot tell, what was in the mask stays in it; but a surface that comes out from behind a
   // mover only touched it, and starts small.
   const bool goes_on =

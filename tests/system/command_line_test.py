@@ -179,6 +179,9 @@ class Usage(Case):
         done = stillmap("memory-plan", "--set", f"archive.dir={self.folder}/a", "--set", "map.free_space=hierarchical")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("archive: groups on their way", done.stdout)
+        done = stillmap("memory-plan", "--set", "depth.invalid=complete")  # fits without another key
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("completed depth", done.stdout)
         paper = ROOT / "config/presets/paper.toml"
         done = stillmap("memory-plan", "--config", paper)
         self.assertEqual(done.returncode, 0, done.stderr)

@@ -91,6 +91,7 @@ TEST(Presets, PaperTakesWhatTheDesignSaysWhereThePaperIsSilent) {
   EXPECT_EQ(paper.track.iterations_coarse, 6);
   EXPECT_EQ(paper.track.iterations_middle, 3);
   EXPECT_EQ(paper.track.iterations_fine, 2);
+  EXPECT_EQ(paper.track.settled_m, 0.0f);
   EXPECT_TRUE(paper.mask.enabled);
   EXPECT_EQ(paper.mask.erode_px, 15);
   EXPECT_EQ(paper.mask.dilate_px, 10);

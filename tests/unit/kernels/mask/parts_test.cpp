@@ -109,6 +109,31 @@ TEST_F(PartsTest, TheLargerSpaceDecidesWhatMovesNotTheLargerPicture) {
   EXPECT_EQ(dynamic_cells(), 60 * kRows);
 }
 
+// It swings back towards where the map has it: what was dynamic stays so at an offset that shows no new
+// mover.
+TEST_F(PartsTest, AMoverThatComesNearItsOldPlaceIsStillOne) {
+  const Patch box = {0, kRows, 10, 70};
+  put(box, 0.7f, 0);
+  shift({0, kRows, 0, kCols}, {});
+  float of_limit = 0;  // how far the box lies off
+  const auto dynamic_at = [&](float offset_m) {
+    shift(box, {0, 0, offset_m});
+    decide();
+    const Part& found = memory.parts[static_cast<uint32_t>(cells.part.at(kRows / 2, 40))];
+    of_limit = found.moved_m / may_move_m(found, params);
+    return dynamic_cells();
+  };
+  const float far_m = 0.01f;
+  EXPECT_EQ(dynamic_at(far_m), 60 * kRows);
+  ASSERT_GT(of_limit, 1.0f);
+  const float nearer_m = far_m * 0.8f / of_limit, near_m = far_m * 0.3f / of_limit;
+  EXPECT_EQ(dynamic_at(nearer_m), 0) << "it was static";
+  EXPECT_NEAR(of_limit, 0.8f, 0.05f);
+  in(box, [&](int32_t r, int32_t c) { cells.expected.at(r, c) = 255; });
+  EXPECT_EQ(dynamic_at(nearer_m), 60 * kRows);
+  EXPECT_EQ(dynamic_at(near_m), 0) << "back in its place";
+}
+
 TEST_F(PartsTest, WhenTheCameraMovedNothingElseDid) {
   put(kBox, kNearM, 0);
   shift({0, kRows, 0, kCols}, {0.02f, -0.01f, 0.01f});
