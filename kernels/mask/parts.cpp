@@ -54,6 +54,10 @@ bool settled(const CellGrid& cells, int32_t r, int32_t c) {
   return cells.settled_frames > 0 && cells.still.at(r, c) >= cells.settled_frames;
 }
 
+bool stands(const Part& part) {
+  return static_cast<float>(part.settled) > kSettledShare * static_cast<float>(part.cells);
+}
+
 float cell_area_m2(const CellGrid& cells, int32_t r, int32_t c) {
   const float edge_m = cells.depth_m.at(r, c) / cells.k.fx;
   return edge_m * edge_m;
@@ -353,13 +357,13 @@ void decide(Part& part, const MaskParams& params, float usual, bool believe_move
   const float share = part.known > 0 ? part.contradicts / part.known : 0.0f;
   const float limit = was && !hardly_known ? params.share_off : params.share_on;
   const bool contradicts = part.contradicts_m2 >= params.blob_m2 && share > limit;
-  const bool stands = static_cast<float>(part.settled) > kSettledShare * static_cast<float>(part.cells);
-  part.moved = !stands && believe_moves && has_moved(part, params, was ? kStillMovesShare * usual : usual);
+  const bool stood = stands(part);
+  part.moved = !stood && believe_moves && has_moved(part, params, was ? kStillMovesShare * usual : usual);
   // Where the map cannot tell, what was in the mask stays in it; but a surface that comes out from behind a
   // mover only touched it, and starts small.
   const bool goes_on =
       params.warp && hardly_known && 2 * part.expected_inside > part.cells && part.area_m2 >= params.blob_m2;
-  part.dynamic = part.moved || (!stands && (contradicts || goes_on));
+  part.dynamic = part.moved || (!stood && (contradicts || goes_on));
 }
 
 }  // namespace
@@ -386,8 +390,12 @@ void decide_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory
     const Contradiction evidence = cells.evidence.at(r, c);
     return !part_of(r, c).moved && ((evidence >= 0.0f && evidence < kContradicts) || settled(cells, r, c));
   });
-  set_blobs(cells, memory, params.blob_m2, kSet,
-            [&](int32_t r, int32_t c) { return cells.evidence.at(r, c) >= 1.0f && !settled(cells, r, c); });
+  // Of a part that stands, half the time will do: noise has started the count of some of its cells again.
+  set_blobs(cells, memory, params.blob_m2, kSet, [&](int32_t r, int32_t c) {
+    if (cells.evidence.at(r, c) < 1.0f || settled(cells, r, c)) return false;
+    const bool with_what_stands = cells.part.at(r, c) >= 0 && stands(part_of(r, c));
+    return !with_what_stands || 2 * cells.still.at(r, c) < cells.settled_frames;
+  });
   grow(cells, memory, params.grow_m);
 }
 

@@ -134,6 +134,24 @@ TEST_F(PartsTest, AMoverThatComesNearItsOldPlaceIsStillOne) {
   EXPECT_EQ(dynamic_at(near_m), 0) << "back in its place";
 }
 
+// Noise has started the count of some cells of a thing that stands again; what has just come before it is no
+// part of that.
+TEST_F(PartsTest, OfAPartThatStandsHalfTheTimeWillDo) {
+  const Patch begun_again = {20, 26, 30, 50}, rest = {26, 40, 30, 50};
+  put(kBox, kNearM, 1);
+  cells.settled_frames = 30;
+  params.grow_m = 0;
+  const auto dynamic_after = [&](int32_t frames) {
+    in(rest, [&](int32_t r, int32_t c) { cells.still.at(r, c) = 40; });
+    in(begun_again, [&](int32_t r, int32_t c) { cells.still.at(r, c) = static_cast<uint16_t>(frames); });
+    decide();
+    EXPECT_EQ(dynamic_cells(rest), 0);
+    return dynamic_cells(begun_again);
+  };
+  EXPECT_EQ(dynamic_after(14), 6 * 20);
+  EXPECT_EQ(dynamic_after(15), 0);
+}
+
 TEST_F(PartsTest, WhenTheCameraMovedNothingElseDid) {
   put(kBox, kNearM, 0);
   shift({0, kRows, 0, kCols}, {0.02f, -0.01f, 0.01f});
