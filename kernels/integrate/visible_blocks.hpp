@@ -206,13 +206,14 @@ struct VisibleGroupPass {
   STILLMAP_HD CubeGeometry group_cube() const { return cube_geometry(kGroupEdge * kBlockEdge, map.voxel_m); }
   STILLMAP_HD bool settled(BlockRef ref) const { return is_free(ref) && payload(ref) >= enough; }
   /// Blocks without voxels that were looked at a few times take turns while nothing is new about them: every
-  /// look goes over all their voxels. A surface that comes there waits for three frames at most.
+  /// look goes over all their voxels. A surface that comes there waits for three frames at most; partly seen
+  /// ones rest every second frame, for a view that turns passes their rest in a few.
   STILLMAP_HD bool rests(Int3 block, BlockRef ref) const {
-    constexpr int32_t kTurns = 4;
     const bool partly = is_partly(ref);
+    const int32_t turns = partly ? 2 : 4;
     const uint32_t looks = is_free(ref) ? payload(ref) : partly ? map.partly[payload(ref)].looks : 0u;
     if (looks < first_looks || (partly && map.partly[payload(ref)].grew)) return false;
-    return ((block.x + block.y + block.z + frame) & (kTurns - 1)) != 0;
+    return ((block.x + block.y + block.z + frame) & (turns - 1)) != 0;
   }
 
   template <class Voxels>
