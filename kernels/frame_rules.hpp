@@ -9,7 +9,7 @@
 #include "kernels/engine.hpp"
 #include "kernels/integrate/visible_blocks.hpp"
 #include "kernels/map/block_ref.hpp"
-#include "kernels/mask/slide.hpp"
+#include "kernels/mask/cells.hpp"
 #include "kernels/track/track_pass.hpp"
 
 namespace stillmap {

@@ -206,8 +206,8 @@ struct VisibleGroupPass {
   STILLMAP_HD CubeGeometry group_cube() const { return cube_geometry(kGroupEdge * kBlockEdge, map.voxel_m); }
   STILLMAP_HD bool settled(BlockRef ref) const { return is_free(ref) && payload(ref) >= enough; }
   /// Blocks without voxels that were looked at a few times take turns while nothing is new about them: every
-  /// look goes over all their voxels. A surface that comes there waits for three frames at most; partly seen
-  /// ones rest every second frame, for a view that turns passes their rest in a few.
+  /// look goes over all their voxels. A surface that comes there waits for three frames at most. Partly seen
+  /// ones rest every second frame only: a view that turns passes what is still unseen of them in a few.
   STILLMAP_HD bool rests(Int3 block, BlockRef ref) const {
     const bool partly = is_partly(ref);
     const int32_t turns = partly ? 2 : 4;
