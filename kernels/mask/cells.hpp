@@ -31,6 +31,10 @@ constexpr uint8_t kDoubted = 1;
 /// Dynamic, but only for its place: on a bend beside a dynamic part, or what the mask grew over.
 constexpr uint8_t kTouched = 2;
 
+STILLMAP_HD bool is_dynamic(uint8_t cell) {
+  return cell > kDoubted;
+}
+
 /// From here on a cell counts as contradicting the map.
 constexpr Contradiction kContradicts = 0.5f;
 
@@ -92,7 +96,7 @@ struct CellGrid {
   ImageView<uint8_t> fused;     ///< measurements that made the map's surface there; few: it is on probation
   ImageView<float> crept_m;     ///< how far it has gone along its normal in that time
   ImageView<uint16_t> still;    ///< frames that the surface in a cell has been where it is, at most 65535
-  ImageView<uint8_t> dynamic;   ///< 0: static, kTouched, or 255: dynamic
+  ImageView<uint8_t> dynamic;   ///< 0: static, kDoubted, kTouched, or 255: dynamic
   ImageView<uint8_t> expected;  ///< kDoubted, or dynamic by the last frame's mask, carried into this one
   int32_t settled_frames = 0;   ///< mask.reabsorb_s: what is still for so many is static; 0: never
   ImageView<int32_t> part;      ///< number of the connected part a cell belongs to; < 0: none

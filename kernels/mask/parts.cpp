@@ -147,11 +147,12 @@ void grow(const CellGrid& cells, const PartMemory& memory, float grow_m) {
   for (int32_t r = 0; r < found.rows; ++r)
     for (int32_t c = 0; c < found.cols; ++c) {
       const float z_m = cells.depth_m.at(r, c);
-      if (!found.at(r, c) || z_m <= 0.0f) continue;
+      if (!is_dynamic(found.at(r, c)) || z_m <= 0.0f) continue;
       const int32_t reach = std::min(8, static_cast<int32_t>(grow_m * cells.k.fx / z_m + 0.5f));
       for (int32_t nr = std::max(r - reach, 0); nr <= std::min(r + reach, found.rows - 1); ++nr)
         for (int32_t nc = std::max(c - reach, 0); nc <= std::min(c + reach, found.cols - 1); ++nc)
-          if (!found.at(nr, nc) && std::fabs(cells.depth_m.at(nr, nc) - z_m) < grow_m + depth_edge_m(z_m))
+          if (!is_dynamic(found.at(nr, nc)) &&
+              std::fabs(cells.depth_m.at(nr, nc) - z_m) < grow_m + depth_edge_m(z_m))
             cells.dynamic.at(nr, nc) = kTouched;
     }
 }
@@ -211,7 +212,8 @@ void gather_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory
       add_to_box(part, r, c);
       ++part.cells;
       part.settled += settled(cells, r, c);
-      part.expected += cells.expected.at(r, c) > kDoubted;
+      part.expected += is_dynamic(cells.expected.at(r, c));
+      part.expected_or_doubted += cells.expected.at(r, c) != 0;
       part.expected_inside += cells.expected.at(r, c) > kTouched;
       const float area_m2 = cell_area_m2(cells, r, c);
       part.area_m2 += area_m2;
@@ -358,7 +360,12 @@ void decide(Part& part, const MaskParams& params, float usual, bool believe_move
   const float limit = was && !hardly_known ? params.share_off : params.share_on;
   const bool contradicts = part.contradicts_m2 >= params.blob_m2 && share > limit;
   const bool stood = stands(part);
-  part.moved = !stood && believe_moves && has_moved(part, params, was ? kStillMovesShare * usual : usual);
+  const bool seems_moved =
+      !stood && believe_moves && has_moved(part, params, was ? kStillMovesShare * usual : usual);
+  // Noise, or the other side of a thin thing, lies off for one frame: what moves does so in the next one too.
+  const bool twice = !params.warp || 2 * part.expected_or_doubted > part.cells;
+  part.moved = seems_moved && twice;
+  part.doubted = seems_moved && !twice;
   // Where the map cannot tell, what was in the mask stays in it; but a surface that comes out from behind a
   // mover only touched it, and starts small.
   const bool goes_on =
@@ -380,13 +387,17 @@ void decide_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory
     return memory.parts[static_cast<uint32_t>(cells.part.at(r, c))];
   };
   for (int32_t r = 0; r < cells.part.rows; ++r)
-    for (int32_t c = 0; c < cells.part.cols; ++c)
-      if (cells.part.at(r, c) >= 0 && part_of(r, c).dynamic)
+    for (int32_t c = 0; c < cells.part.cols; ++c) {
+      if (cells.part.at(r, c) < 0) continue;
+      if (part_of(r, c).dynamic)
         cells.dynamic.at(r, c) = memory.border.at(r, c) ? kTouched : kSet;
+      else if (part_of(r, c).doubted)
+        cells.dynamic.at(r, c) = kDoubted;
+    }
   // A thing that was put down makes one part with what it stands on, or with who put it there: what the map
   // knows well stays static, and so does what has settled.
   set_blobs(cells, memory, params.moved_m2, 0, [&](int32_t r, int32_t c) {
-    if (cells.part.at(r, c) < 0 || !cells.dynamic.at(r, c)) return false;
+    if (cells.part.at(r, c) < 0 || !is_dynamic(cells.dynamic.at(r, c))) return false;
     const Contradiction evidence = cells.evidence.at(r, c);
     return !part_of(r, c).moved && ((evidence >= 0.0f && evidence < kContradicts) || settled(cells, r, c));
   });

@@ -11,6 +11,7 @@ namespace stillmap {
 /// What is known of one connected part of the picture.
 struct Part {
   int32_t cells = 0, expected = 0;
+  int32_t expected_or_doubted = 0;
   int32_t expected_inside = 0;                     ///< without what was only kTouched
   int32_t row0 = 0, row1 = 0, col0 = 0, col1 = 0;  ///< all its cells lie in here, ends excluded
   int32_t settled = 0;                             ///< cells that stood still for CellGrid::settled_frames
@@ -18,8 +19,9 @@ struct Part {
   float area_m2 = 0, contradicts_m2 = 0;  ///< as seen; of what contradicts
   float noise_m = 0;                      ///< mean of the cells' noise
   NormalEq motion;                        ///< its own least squares by the motion of the camera
-  float moved_m = 0;   ///< how far its surface lies off where the whole picture would have it
-  bool moved = false;  ///< farther than it may
+  float moved_m = 0;     ///< how far its surface lies off where the whole picture would have it
+  bool moved = false;    ///< farther than it may
+  bool doubted = false;  ///< for the first time: once more, and it has moved
   bool dynamic = false;
 };
 

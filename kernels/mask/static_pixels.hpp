@@ -29,10 +29,10 @@ struct DynamicPixelPass {
   }
   /// True when the depth of a pixel in cell (r, c) does not matter: all cells that it can belong to agree.
   STILLMAP_HD bool all_agree(int32_t r, int32_t c) const {
-    const bool own = cells.dynamic.at(r, c) != 0;
+    const bool own = is_dynamic(cells.dynamic.at(r, c));
     for (int32_t i = 0; i < 9; ++i) {
       const int32_t nr = r + i / 3 - 1, nc = c + i % 3 - 1;
-      if (cells.dynamic.contains(nr, nc) && (cells.dynamic.at(nr, nc) != 0) != own) return false;
+      if (cells.dynamic.contains(nr, nc) && is_dynamic(cells.dynamic.at(nr, nc)) != own) return false;
     }
     return true;
   }
@@ -41,7 +41,7 @@ struct DynamicPixelPass {
   /// The cell around, or, where its surface is another one, the neighbour whose depth is nearest. Between two
   /// surfaces (a flying pixel) the dynamic one has it.
   STILLMAP_HD bool dynamic_at(int32_t r, int32_t c, float z_m) const {
-    const bool own = cells.dynamic.at(r, c) != 0;
+    const bool own = is_dynamic(cells.dynamic.at(r, c));
     const float cell_m = cells.depth_m.at(r, c);
     if (z_m <= 0.0f) return own;
     if (cell_m > 0.0f && fabsf(cell_m - z_m) <= depth_edge_m(z_m)) return own;
@@ -50,7 +50,7 @@ struct DynamicPixelPass {
     for (int32_t i = 0; i < 9; ++i) {
       const int32_t nr = r + i / 3 - 1, nc = c + i % 3 - 1;
       if (!cells.depth_m.contains(nr, nc)) continue;
-      const bool here = cells.dynamic.at(nr, nc) != 0;
+      const bool here = is_dynamic(cells.dynamic.at(nr, nc));
       const float away_m = fabsf(cells.depth_m.at(nr, nc) - z_m);
       any |= here;
       if (cells.depth_m.at(nr, nc) > 0.0f && away_m <= best_m) {

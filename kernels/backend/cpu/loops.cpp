@@ -246,7 +246,8 @@ void dynamic_pixels(const DynamicPixelPass& pass, int32_t first_row, int32_t las
       const int32_t end = last ? pass.mask.cols : (cell + 1) * cells.px;
       const int32_t row = cell_row(cells, r);
       if (pass.all_agree(row, cell))
-        std::fill(pass.mask.row(r) + c, pass.mask.row(r) + end, cells.dynamic.at(row, cell) ? 255 : 0);
+        std::fill(pass.mask.row(r) + c, pass.mask.row(r) + end,
+                  is_dynamic(cells.dynamic.at(row, cell)) ? 255 : 0);
       else
         for (int32_t i = c; i < end; ++i) pass(r, i);
       c = end;

@@ -72,6 +72,10 @@ class PartsTest : public testing::Test {
     find_bends(cells, memory, params, 0, kRows);
     return segment(cells, memory, noise);
   }
+  /// As if the last frame had it so.
+  void expect(const Patch& patch, uint8_t what) {
+    in(patch, [&](int32_t r, int32_t c) { cells.expected.at(r, c) = what; });
+  }
   int32_t decide() {
     const int32_t count = find_parts();
     gather_parts(cells, count, memory, noise);
@@ -81,7 +85,7 @@ class PartsTest : public testing::Test {
   }
   int32_t dynamic_cells(const Patch& where = {0, kRows, 0, kCols}) {
     int32_t n = 0;
-    in(where, [&](int32_t r, int32_t c) { n += cells.dynamic.at(r, c) != 0; });
+    in(where, [&](int32_t r, int32_t c) { n += is_dynamic(cells.dynamic.at(r, c)); });
     return n;
   }
   /// The surface of the patch lies `off` from where the map has it, with normals that show all directions.
