@@ -23,8 +23,7 @@ Result<std::unique_ptr<FrameSource>> CalibratedSource::make(std::unique_ptr<Fram
                  ErrorKind::bad_usage};
   made->registration_.emplace(*depth_camera, info.camera, info.depth_units_per_m);
   made->depth_.resize(static_cast<size_t>(k.width) * static_cast<size_t>(k.height));
-  info.registration_bytes =
-      DepthRegistration::bytes(k.height, k.width) + made->depth_.size() * sizeof(made->depth_[0]);
+  info.registration_bytes = registration_bytes(k.height, k.width);
   return std::unique_ptr<FrameSource>(std::move(made));
 }
 

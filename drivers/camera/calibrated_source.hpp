@@ -21,6 +21,12 @@ class CalibratedSource final : public FrameSource {
                                                    const DepthBias& depth_bias,
                                                    std::optional<DepthCamera> depth_camera);
 
+  /// Of registering depth images of that size to colour: SourceInfo::registration_bytes.
+  static uint64_t registration_bytes(int32_t rows, int32_t cols) {
+    return DepthRegistration::bytes(rows, cols) +
+           static_cast<uint64_t>(rows) * static_cast<uint64_t>(cols) * sizeof(uint16_t);
+  }
+
   const SourceInfo& info() const override { return info_; }
   Status next(RgbdFrame& frame, int32_t timeout_ms) override;
   std::vector<Vec3> truth_cloud() const override { return source_->truth_cloud(); }

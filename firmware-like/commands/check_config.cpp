@@ -22,13 +22,9 @@ Result<Done> check_plausible(const Config& config) {
     add(implausible(
         {{c.fx, c.fy, c.cx, c.cy, config.source.cols, config.source.rows}, {c.k1, c.k2, c.p1, c.p2, c.k3}},
         "camera."));
-  if (!c.calibration.empty()) {
-    const auto file = find_calibration(c.calibration);
-    if (!file) return Error{file.error(), file.error_kind()};
-    const auto calibration = load_calibration(*file);
-    if (!calibration) return Error{calibration.error(), calibration.error_kind()};
-    add(implausible(*calibration, *file, config.source.cols, config.source.rows, config.depth));
-  }
+  const auto calibration = configured_calibration(config);
+  if (!calibration) return Error{calibration.error(), calibration.error_kind()};
+  add(implausible(*calibration, c.calibration, config.source.cols, config.source.rows, config.depth));
   if (text.empty()) return Done{};
   return Error{"most likely wrong, though `stillmap run` would use it:" + text, ErrorKind::bad_usage};
 }

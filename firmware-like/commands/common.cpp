@@ -49,6 +49,13 @@ Result<Done> check(const Config& config) {
   return Error{"the configuration cannot be used:" + text, ErrorKind::bad_usage};
 }
 
+Result<Calibration> configured_calibration(const Config& config) {
+  if (config.camera.calibration.empty()) return Calibration{};
+  const auto file = find_calibration(config.camera.calibration);
+  if (!file) return Error{file.error(), file.error_kind()};
+  return load_calibration(*file);
+}
+
 SourceOptions source_options(const Config& config) {
   SourceOptions options;
   const CameraConfig& c = config.camera;

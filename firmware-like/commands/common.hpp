@@ -24,6 +24,12 @@ Result<Config> read_config(const std::string& path, const std::vector<std::strin
 /// @return an error of kind bad_usage that lists every violation, one a line
 Result<Done> check(const Config& config);
 
+/// Of the memory plan, where depth is still to be registered.
+constexpr const char* kRegistrationEntry = "registration of depth to colour";
+
+/// What camera.calibration says; empty where there is none.
+Result<Calibration> configured_calibration(const Config& config);
+
 /// Where far parts of the map go, as the configuration says.
 BlockArchive::Options archive_options(const Config& config);
 

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "config/engine_params.hpp"
+#include "drivers/camera/calibrated_source.hpp"
 #include "firmware-like/commands/command.hpp"
 #include "firmware-like/commands/common.hpp"
 
@@ -26,7 +27,10 @@ int show(const MemoryPlanOptions& o) {
   CameraModel camera;
   camera.k = {525, 525, 319.5f, 239.5f, kWidth, kHeight};
   const EngineParams params = engine_params(*config, camera, 5000);
-  const MemoryPlan plan = plan_memory(*config, params);
+  MemoryPlan plan = plan_memory(*config, params);
+  const auto calibration = configured_calibration(*config);
+  if (!calibration) return fail(calibration.error(), calibration.error_kind());
+  if (calibration->depth) plan.add(kRegistrationEntry, CalibratedSource::registration_bytes(kHeight, kWidth));
   std::printf("for images of %dx%d pixels\n%s", kWidth, kHeight, table(plan).c_str());
   if (plan.fits()) return kExitDone;
   return fail("the plan is over memory.budget_mb; raise it or lower map.pool_blocks", ErrorKind::bad_usage);

@@ -220,8 +220,7 @@ int run_with(FrameSource& source, const RunOptions& o, const RunPlan& plan, std:
   params.on_worker = heap_guard::arm_worker;
   const std::string device = pick_device(o.device, o.quiet);
   MemoryPlan memory = plan_memory(config, params, device);
-  if (source.info().registration_bytes > 0)
-    memory.add("registration of depth to colour", source.info().registration_bytes);
+  if (source.info().registration_bytes > 0) memory.add(kRegistrationEntry, source.info().registration_bytes);
   if (const auto fits = check_budget(memory); !fits) return fail(fits.error(), fits.error_kind());
   const std::unique_ptr<Engine> engine = make_engine(device, params);
   if (!engine)

@@ -41,16 +41,24 @@ STILLMAP_HD Vec3 unproject(const Intrinsics& k, float u, float v, float z_m) {
   return {(u - k.cx) / k.fx * z_m, (v - k.cy) / k.fy * z_m, z_m};
 }
 
-/// Where the ideal pixel `p` lies in the distorted image.               test: pinhole_test
-STILLMAP_HD Pixel distort(const CameraModel& camera, Pixel p) {
+/// Where the ideal pixel (u, v) lies in the distorted image; over a number type (base/lane.hpp).
+template <class F>
+STILLMAP_HD void distort(const CameraModel& camera, F& u, F& v) {
   const Intrinsics& k = camera.k;
   const Distortion& d = camera.distortion;
-  const float x = (p.u - k.cx) / k.fx, y = (p.v - k.cy) / k.fy;
-  const float r2 = x * x + y * y;
-  const float radial = 1.0f + r2 * (d.k1 + r2 * (d.k2 + r2 * d.k3));
-  const float xd = x * radial + 2.0f * d.p1 * x * y + d.p2 * (r2 + 2.0f * x * x);
-  const float yd = y * radial + d.p1 * (r2 + 2.0f * y * y) + 2.0f * d.p2 * x * y;
-  return {k.fx * xd + k.cx, k.fy * yd + k.cy};
+  const F x = (u - F(k.cx)) * F(1.0f / k.fx), y = (v - F(k.cy)) * F(1.0f / k.fy);
+  const F r2 = x * x + y * y, xy = x * y;
+  const F radial = F(1.0f) + r2 * (F(d.k1) + r2 * (F(d.k2) + r2 * F(d.k3)));
+  const F xd = x * radial + F(2.0f * d.p1) * xy + F(d.p2) * (r2 + F(2.0f) * x * x);
+  const F yd = y * radial + F(d.p1) * (r2 + F(2.0f) * y * y) + F(2.0f * d.p2) * xy;
+  u = F(k.fx) * xd + F(k.cx);
+  v = F(k.fy) * yd + F(k.cy);
+}
+
+/// The same of one pixel.                                               test: pinhole_test
+STILLMAP_HD Pixel distort(const CameraModel& camera, Pixel p) {
+  distort(camera, p.u, p.v);
+  return p;
 }
 
 /// The same camera for every `step`-th pixel (levels by sub-sampling, paper section III-B).

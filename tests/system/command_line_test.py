@@ -182,6 +182,14 @@ class Usage(Case):
         done = stillmap("memory-plan", "--set", "depth.invalid=complete")  # fits without another key
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("completed depth", done.stdout)
+        unregistered = self.folder / "unregistered.toml"
+        unregistered.write_text("[depth]\nfx = 570.0\nfy = 570.0\ncx = 319.5\ncy = 239.5\n"
+                                "T_colour_depth = [-0.025, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]\n")
+        self.assertNotIn("registration", done.stdout)
+        done = stillmap("memory-plan", "--set", f"camera.calibration={unregistered}")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("registration of depth to colour", done.stdout)
+        self.refused(2, "memory-plan", "--set", "camera.calibration=missing.toml", says=["missing.toml"])
         paper = ROOT / "config/presets/paper.toml"
         done = stillmap("memory-plan", "--config", paper)
         self.assertEqual(done.returncode, 0, done.stderr)

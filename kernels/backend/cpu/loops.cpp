@@ -60,6 +60,56 @@ int32_t prepare(const PreparePass& pass, int32_t first_row, int32_t last_row) {
   return valid;
 }
 
+#if defined(__AVX2__)
+/// Where the pixels of a run land.
+struct LandedRun {
+  static constexpr int32_t kMost = 16 * kLanes;
+  int32_t first[kMost], extent[kMost], raw[kMost];
+
+  void store(int32_t at, const LandedPixel<Int8>& landed) {
+    landed.first.store(first + at);
+    landed.extent.store(extent + at);
+    landed.raw.store(raw + at);
+  }
+  LandedPixel<int32_t> operator[](int32_t i) const { return {first[i], extent[i], raw[i]}; }
+};
+#endif
+
+template <bool kBent>
+void register_row(const RegisterPass& pass, int32_t row, const uint16_t* raw, ImageView<uint16_t> out) {
+  const float *x = pass.ray_x.row(row), *y = pass.ray_y.row(row), *z = pass.ray_z.row(row);
+  int32_t c = 0;
+#if defined(__AVX2__)  // elsewhere the compiler makes more of single pixels
+  LandedRun run;
+  while (c + kLanes <= pass.ray_x.cols) {
+    int32_t landed = 0;
+    for (; landed < LandedRun::kMost && c + kLanes <= pass.ray_x.cols; landed += kLanes, c += kLanes) {
+      Int8 depth_raw;
+      for (int32_t l = 0; l < kLanes; ++l) depth_raw.v[l] = raw[c + l];
+      run.store(landed, pass.land<kBent>(Float8::load(x + c), Float8::load(y + c), Float8::load(z + c),
+                                         depth_raw, out.pitch));
+    }
+    for (int32_t i = 0; i < landed; ++i) put_nearest(run[i], out);
+  }
+#endif
+  for (; c < pass.ray_x.cols; ++c)
+    put_nearest(pass.land<kBent>(x[c], y[c], z[c], int32_t{raw[c]}, out.pitch), out);
+}
+
+void register_depth(const RegisterPass& pass, const ImageView<const uint16_t>& depth_raw,
+                    const ImageView<uint16_t>& registered_raw) {
+  for (int32_t r = 0; r < registered_raw.rows; ++r)
+    std::fill_n(registered_raw.row(r), registered_raw.cols, kRawFar);
+  const bool bent = !pass.colour.distortion.none();
+  for (int32_t r = 0; r < depth_raw.rows; ++r)
+    bent ? register_row<true>(pass, r, depth_raw.row(r), registered_raw)
+         : register_row<false>(pass, r, depth_raw.row(r), registered_raw);
+  for (int32_t r = 0; r < registered_raw.rows; ++r) {
+    uint16_t* out = registered_raw.row(r);
+    for (int32_t c = 0; c < registered_raw.cols; ++c) out[c] = out[c] == kRawFar ? uint16_t{0} : out[c];
+  }
+}
+
 using TrackBlocks = RecentBlocks<6>;
 constexpr int32_t kBatch = 64;  ///< pixels of a row at a time: everything about them stays in the first cache
 
@@ -327,9 +377,9 @@ void complete(const CompletePass& pass, int32_t first_row, int32_t last_row) {
 }  // namespace
 
 extern const CpuLoops STILLMAP_LOOPS;
-const CpuLoops STILLMAP_LOOPS = {STILLMAP_LOOPS_NAME, prepare,      track,         residual_mask,
-                                 cell_depth,          cell_normals, cell_evidence, still_cells,
-                                 dynamic_pixels,      trust,        static_depth,  visible_group,
-                                 integrate,           start_depth,  silent_cells,  complete};
+const CpuLoops STILLMAP_LOOPS = {
+    STILLMAP_LOOPS_NAME, prepare,       register_depth, track,          residual_mask, cell_depth,
+    cell_normals,        cell_evidence, still_cells,    dynamic_pixels, trust,         static_depth,
+    visible_group,       integrate,     start_depth,    silent_cells,   complete};
 
 }  // namespace stillmap

@@ -16,6 +16,7 @@
 #include "kernels/mask/residual_mask.hpp"
 #include "kernels/mask/static_pixels.hpp"
 #include "kernels/prepare/prepare_pixel.hpp"
+#include "kernels/prepare/register_pixel.hpp"
 #include "kernels/track/track_pass.hpp"
 
 namespace stillmap {
@@ -24,6 +25,9 @@ struct CpuLoops {
   const char* name;
   /// @return pixels with a depth in range, rows [first, last)
   int32_t (*prepare)(const PreparePass&, int32_t first_row, int32_t last_row);
+  /// All of an image.
+  void (*register_depth)(const RegisterPass&, const ImageView<const uint16_t>& depth_raw,
+                         const ImageView<uint16_t>& registered_raw);
   /// Sums over every `step`-th pixel of every `step`-th row in [first, last).
   /// @param kept of the same map; written, the rows looked at only. `step` is a multiple of its own
   NormalEqT<float> (*track)(const TrackPass&, const KeptCorners& kept, int32_t first_row, int32_t last_row,
