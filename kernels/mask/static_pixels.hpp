@@ -79,7 +79,10 @@ struct TrustPass {
   static constexpr float kExpectedTrust = 0.1f;
 
   STILLMAP_HD void operator()(int32_t row, int32_t col) const {
-    const int32_t r = cell_row(cells, row), c = cell_col(cells, col);
+    in_cell(row, col, cell_row(cells, row), cell_col(cells, col));
+  }
+  /// @param r, c the cell of pixel (row, col)
+  STILLMAP_HD void in_cell(int32_t row, int32_t col, int32_t r, int32_t c) const {
     const float z_m = depth_m.at(row, col);
     const bool dynamic = mask.data ? mask.at(row, col) != 0 : cells.expected.at(r, c) != 0;
     float t = 255.0f;

@@ -286,26 +286,42 @@ void still_cells(const StillPass& pass, int32_t first_row, int32_t last_row) {
     for (int32_t c = 0; c < pass.cells.depth_m.cols; ++c) pass(r, c);
 }
 
+/// End of the pixels of cell `cell` of `cells` ones along `pixels` pixels: what is left over is the last
+/// one's.
+int32_t end_of_cell(int32_t cell, int32_t cells, int32_t px, int32_t pixels) {
+  return cell + 1 == cells ? pixels : (cell + 1) * px;
+}
+
 /// Where all cells around agree, which is most of the picture, no pixel is looked at.
 void dynamic_pixels(const DynamicPixelPass& pass, int32_t first_row, int32_t last_row) {
   const CellGrid& cells = pass.cells;
-  for (int32_t r = first_row; r < last_row; ++r)
-    for (int32_t c = 0; c < pass.mask.cols;) {
-      const int32_t cell = cell_col(cells, c);
-      const bool last = cell + 1 == cells.depth_m.cols;
-      const int32_t end = last ? pass.mask.cols : (cell + 1) * cells.px;
-      const int32_t row = cell_row(cells, r);
-      if (pass.all_agree(row, cell))
-        std::fill(pass.mask.row(r) + c, pass.mask.row(r) + end,
-                  is_dynamic(cells.dynamic.at(row, cell)) ? 255 : 0);
-      else
-        for (int32_t i = c; i < end; ++i) pass(r, i);
-      c = end;
+  int32_t end_row = first_row;
+  for (int32_t r0 = first_row; r0 < last_row; r0 = end_row) {
+    const int32_t row = cell_row(cells, r0);
+    end_row = std::min(last_row, end_of_cell(row, cells.depth_m.rows, cells.px, pass.mask.rows));
+    for (int32_t cell = 0; cell < cells.depth_m.cols; ++cell) {
+      const int32_t c0 = cell * cells.px,
+                    c1 = end_of_cell(cell, cells.depth_m.cols, cells.px, pass.mask.cols);
+      const bool all_agree = pass.all_agree(row, cell);
+      const uint8_t value = is_dynamic(cells.dynamic.at(row, cell)) ? 255 : 0;
+      for (int32_t r = r0; r < end_row; ++r)
+        for (int32_t c = c0; c < c1; ++c)
+          if (all_agree)
+            pass.mask.at(r, c) = value;
+          else
+            pass(r, c);
     }
+  }
 }
 void trust(const TrustPass& pass, int32_t first_row, int32_t last_row, int32_t step) {
-  for (int32_t r = first_row; r < last_row; r += step)
-    for (int32_t c = 0; c < pass.depth_m.cols; c += step) pass(r, c);
+  const CellGrid& cells = pass.cells;
+  for (int32_t r = first_row; r < last_row; r += step) {
+    const int32_t row = cell_row(cells, r);
+    for (int32_t cell = 0, c = 0; cell < cells.depth_m.cols; ++cell) {
+      const int32_t end = end_of_cell(cell, cells.depth_m.cols, cells.px, pass.depth_m.cols);
+      for (; c < end; c += step) pass.in_cell(r, c, row, cell);
+    }
+  }
 }
 
 void static_depth(const StaticDepthPass& pass, int32_t tile_row) {
