@@ -185,7 +185,7 @@ class Usage(Case):
         unregistered = self.folder / "unregistered.toml"
         unregistered.write_text("[depth]\nfx = 570.0\nfy = 570.0\ncx = 319.5\ncy = 239.5\n"
                                 "T_colour_depth = [-0.025, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]\n")
-        self.assertNotIn("registration", done.stdout)
+        self.assertNotIn("registration of depth", done.stdout)
         done = stillmap("memory-plan", "--set", f"camera.calibration={unregistered}")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("registration of depth to colour", done.stdout)
