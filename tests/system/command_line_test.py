@@ -183,7 +183,8 @@ class Usage(Case):
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("completed depth", done.stdout)
         unregistered = self.folder / "unregistered.toml"
-        unregistered.write_text("[depth]\nfx = 570.0\nfy = 570.0\ncx = 319.5\ncy = 239.5\n"
+        pinhole = "fx = 570.0\nfy = 570.0\ncx = 319.5\ncy = 239.5\n"
+        unregistered.write_text(f"[colour]\n{pinhole}[depth]\n{pinhole}"
                                 "T_colour_depth = [-0.025, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]\n")
         self.assertNotIn("registration of depth", done.stdout)
         done = stillmap("memory-plan", "--set", f"camera.calibration={unregistered}")
