@@ -25,7 +25,8 @@ STILLMAP_HD int32_t cell_px_for(int32_t image_cols) {
 using Contradiction = float;
 constexpr Contradiction kUnknown = -1.0f;  ///< no measurement, or nothing was ever observed there
 
-/// Of an expected mask: static, but not what the map says; no help to tracking.
+/// Of a mask, and of an expected one: static, but not what the map says, or off its place for the first time;
+/// no help to tracking.
 constexpr uint8_t kDoubted = 1;
 
 /// Dynamic, but only for its place: on a bend beside a dynamic part, or what the mask grew over.
