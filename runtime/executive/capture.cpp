@@ -110,9 +110,11 @@ bool Capture::deliver(uint32_t slot) {
   state_.last_stamp_ns.store(last_.ns, std::memory_order_relaxed);
   ++delivered_;
   if (frame.captured.ns == 0) frame.captured.ns = monotonic_ns();
-  const int32_t older = mailbox_.put(slot);
-  if (older != FrameMailbox::kEmpty) slots_.release(static_cast<uint32_t>(older));
-  count_dropped((older != FrameMailbox::kEmpty ? 1 : 0) + source_.left_out() - left_out_);
+  mailbox_.put(slot);
+  uint32_t dropped = source_.left_out() - left_out_;
+  for (int32_t older; (older = mailbox_.crowded_out()) != FrameMailbox::kEmpty; ++dropped)
+    slots_.release(static_cast<uint32_t>(older));
+  count_dropped(dropped);
   left_out_ = source_.left_out();
   return true;
 }

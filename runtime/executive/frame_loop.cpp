@@ -9,6 +9,7 @@ namespace stillmap {
 namespace {
 
 constexpr std::chrono::milliseconds kWait{100};  ///< how long a stop may go unseen
+constexpr uint32_t kStartFrames = 30;  ///< by then what waited for the first one is done, or never will be
 
 void copy_mask(ImageView<const uint8_t> from, ImageView<uint8_t> to) {
   for (int32_t row = 0; row < to.rows; ++row) std::copy_n(from.row(row), to.cols, to.row(row));
@@ -59,6 +60,7 @@ void FrameLoop::work_on(uint32_t slot) {
   obey_requests(result.stamp);
   last_ = result;
   ++frames_;
+  if (frames_ >= kStartFrames || p_.mailbox.empty()) p_.mailbox.newest_wins();
 }
 
 /// Also while no frame comes: the queue is short.

@@ -54,4 +54,41 @@ void FrameSlots::release(uint32_t slot) {
   freed_.release();
 }
 
+namespace {
+
+uint32_t bytes_used(uint64_t word) {
+  return (64 - static_cast<uint32_t>(std::countl_zero(word)) + 7) / 8;
+}
+
+}  // namespace
+
+// One frame more than may wait is in there between `put` and `crowded_out`.
+static_assert(FrameMailbox::kMostWaiting < sizeof(uint64_t) && FrameSlots::kMost < 255);
+
+void FrameMailbox::put(uint32_t slot) {
+  uint64_t was = waiting_.load(std::memory_order_relaxed);
+  while (!waiting_.compare_exchange_weak(was, was | uint64_t{slot + 1} << 8 * bytes_used(was),
+                                         std::memory_order_acq_rel)) {
+  }
+  filled_.release();
+}
+
+int32_t FrameMailbox::pop(uint32_t unless_fewer_than) {
+  uint64_t was = waiting_.load(std::memory_order_acquire);
+  do {
+    if (was == 0 || bytes_used(was) < unless_fewer_than) return kEmpty;
+  } while (!waiting_.compare_exchange_weak(was, was >> 8, std::memory_order_acq_rel));
+  return static_cast<int32_t>(was & 0xff) - 1;
+}
+
+int32_t FrameMailbox::crowded_out() {
+  const int32_t slot = pop(most_.load(std::memory_order_relaxed) + 1);
+  if (slot != kEmpty) (void)filled_.try_acquire();  // may fail: then `take` finds nothing once
+  return slot;
+}
+
+int32_t FrameMailbox::take(std::chrono::milliseconds time) {
+  return filled_.try_acquire_for(time) ? pop(1) : kEmpty;
+}
+
 }  // namespace stillmap

@@ -54,25 +54,32 @@ class FrameSlots {
   std::counting_semaphore<> freed_;
 };
 
-/// Hands the newest frame from one thread to another: there is room for one, and a newer one takes its place.
+/// Hands frames from one thread to another. At the start a few may wait, in their order: the first frame,
+/// which makes the map, takes longer than those after it. From `newest_wins` on there is room for one, and a
+/// newer one takes its place.
 class FrameMailbox {
  public:
   static constexpr int32_t kEmpty = -1;
+  static constexpr uint32_t kMostWaiting = 4;
 
-  /// @return the slot of the older frame that nobody took, or kEmpty.  @thread one; does not wait
-  int32_t put(uint32_t slot) {
-    const int32_t older = slot_.exchange(static_cast<int32_t>(slot), std::memory_order_acq_rel);
-    if (older == kEmpty) filled_.release();
-    return older;
-  }
-  /// @return the slot, or kEmpty when none came within the time.  @thread one, another than put's
-  int32_t take(std::chrono::milliseconds time) {
-    if (!filled_.try_acquire_for(time)) return kEmpty;
-    return slot_.exchange(kEmpty, std::memory_order_acq_rel);
-  }
+  /// @thread one; does not wait
+  void put(uint32_t slot);
+  /// @return the slot of the oldest frame of more than may wait, or kEmpty: there are not more.  @thread
+  /// put's
+  int32_t crowded_out();
+  /// @return the slot of the oldest frame, or kEmpty when none came within the time.  @thread one, another
+  /// than put's
+  int32_t take(std::chrono::milliseconds time);
+  /// @thread take's
+  void newest_wins() { most_.store(1, std::memory_order_relaxed); }
+  bool empty() const { return waiting_.load(std::memory_order_relaxed) == 0; }
 
  private:
-  alignas(64) std::atomic<int32_t> slot_{kEmpty};
+  int32_t pop(uint32_t unless_fewer_than);
+
+  /// A byte each, slot + 1, the oldest lowest.
+  alignas(64) std::atomic<uint64_t> waiting_{0};
+  std::atomic<uint32_t> most_{kMostWaiting};
   std::counting_semaphore<> filled_{0};
 };
 

@@ -57,11 +57,36 @@ TEST(FrameSlots, TwoThreadsNeverHoldTheSame) {
 
 TEST(FrameMailbox, TheNewestFrameWins) {
   FrameMailbox box;
+  box.newest_wins();
   EXPECT_EQ(box.take(milliseconds(0)), FrameMailbox::kEmpty);
-  EXPECT_EQ(box.put(3), FrameMailbox::kEmpty);
-  EXPECT_EQ(box.put(5), 3);
+  box.put(3);
+  EXPECT_EQ(box.crowded_out(), FrameMailbox::kEmpty);
+  box.put(5);
+  EXPECT_EQ(box.crowded_out(), 3);
+  EXPECT_EQ(box.crowded_out(), FrameMailbox::kEmpty);
   EXPECT_EQ(box.take(milliseconds(0)), 5);
   EXPECT_EQ(box.take(milliseconds(1)), FrameMailbox::kEmpty);
+}
+
+TEST(FrameMailbox, AtTheStartAFewWaitInTheirOrder) {
+  FrameMailbox box;
+  EXPECT_TRUE(box.empty());
+  for (const uint32_t slot : {0u, 63u, 7u, 5u}) {
+    box.put(slot);
+    EXPECT_EQ(box.crowded_out(), FrameMailbox::kEmpty);
+  }
+  EXPECT_FALSE(box.empty());
+  box.put(9);
+  EXPECT_EQ(box.crowded_out(), 0);
+  EXPECT_EQ(box.take(milliseconds(0)), 63);
+  box.newest_wins();
+  box.put(11);
+  EXPECT_EQ(box.crowded_out(), 7);
+  EXPECT_EQ(box.crowded_out(), 5);
+  EXPECT_EQ(box.crowded_out(), 9);
+  EXPECT_EQ(box.crowded_out(), FrameMailbox::kEmpty);
+  EXPECT_EQ(box.take(milliseconds(0)), 11);
+  EXPECT_TRUE(box.empty());
 }
 
 TEST(FrameMailbox, EveryFrameIsTakenOrHandedBackOnce) {
@@ -77,9 +102,12 @@ TEST(FrameMailbox, EveryFrameIsTakenOrHandedBackOnce) {
     }
   });
   for (uint32_t i = 1; i <= kFrames; ++i) {
-    put += i;
-    const int32_t older = box.put(i);
-    if (older != FrameMailbox::kEmpty) handed_back += static_cast<uint64_t>(older);
+    const uint32_t slot = i % FrameSlots::kMost;
+    put += slot;
+    box.put(slot);
+    for (int32_t older; (older = box.crowded_out()) != FrameMailbox::kEmpty;)
+      handed_back += static_cast<uint64_t>(older);
+    if (i == kFrames / 2) box.newest_wins();
   }
   done = true;
   reader.join();
