@@ -39,6 +39,30 @@ Arena::~Arena() {
   if (base_ && owner_) munmap(base_, size_);
 }
 
+namespace {
+
+constexpr uint64_t kPage = 4096;
+
+/// Of whole pages.
+void touch(std::byte* begin, const std::byte* end) {
+  if (begin >= end) return;
+#ifdef MADV_POPULATE_WRITE
+  if (madvise(begin, static_cast<size_t>(end - begin), MADV_POPULATE_WRITE) == 0) return;
+#endif
+  for (volatile std::byte* page = begin; page < end; page += kPage) *page = *page;  // an older kernel
+}
+
+}  // namespace
+
+void Arena::touch_all_but(const void* begin, const void* end) {
+  const auto page_at = [&](const void* at) {
+    const auto offset = static_cast<uint64_t>(static_cast<const std::byte*>(at) - base_);
+    return base_ + (offset + kPage - 1) / kPage * kPage;
+  };
+  touch(base_, page_at(begin));
+  touch(page_at(end), base_ + used_);
+}
+
 void* Arena::take_bytes(const char* name, uint64_t bytes) {
   const uint64_t align = bytes >= 4096 ? 4096 : 64;
   const uint64_t begin = (used_ + align - 1) / align * align;

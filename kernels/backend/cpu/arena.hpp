@@ -28,6 +28,11 @@ class Arena {
   bool measuring() const { return base_ == nullptr; }
   bool failed() const { return failed_; }
 
+  /// Asks the system for the pages of all that was carved, but of what lies between: those come when first
+  /// touched.
+  /// @param begin, end within what was carved
+  void touch_all_but(const void* begin, const void* end);
+
   /// The lines of the plan that carving produces.
   const MemoryItems& items() const { return items_; }
 

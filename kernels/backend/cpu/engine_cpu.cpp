@@ -143,6 +143,7 @@ class CpuEngine final : public Engine {
     memory_.carve(arena_, params_);
     memory_.map.clear();
     fill_source_pixels();
+    touch_memory();
   }
   bool failed() const { return arena_.failed(); }
 
@@ -233,6 +234,7 @@ class CpuEngine final : public Engine {
   bool by_parts() const { return params_.mask.enabled && params_.mask.method == MaskMethod::parts; }
   void make_cells();
   void remember_cells(const Se3& T_map_cam);
+  void touch_memory();
   void forget_cells();
   void mask_by_residual(const Se3& T_map_cam);
   void mask_by_parts(const Se3& T_map_cam);
@@ -284,6 +286,14 @@ class CpuEngine final : public Engine {
   uint32_t masks_ = 0;             ///< masks made since the map was empty
   bool continued_ = false;         ///< the map, or part of it, is older than this engine
 };
+
+/// The first frame makes thousands of blocks: it need not wait for the system to find memory for each. What
+/// only a large map takes is left until it does.
+void CpuEngine::touch_memory() {
+  constexpr uint32_t kFirstViewBlocks = 16384;
+  const View<VoxelBlock> blocks = memory_.map.view().blocks;
+  arena_.touch_all_but(blocks.data + std::min(kFirstViewBlocks, blocks.size), blocks.end());
+}
 
 void CpuEngine::fill_source_pixels() {
   const ImageView<Pixel>& map = memory_.source_pixel;

@@ -127,10 +127,11 @@ InsertResult MapStorage::insert(BlockKey key) {
     return {Insert::pool_empty, kNoBlock};
   }
   VoxelBlock& block = view_.blocks[id];
-  fill_voxels(block, {}, {});
-  if (is_free(*ref)) {
+  if (is_free(*ref))
     fill_voxels(block, {kSdfMax, 0}, seen_often(payload(*ref)));
-  } else if (is_partly(*ref)) {
+  else
+    fill_voxels(block, {}, {});
+  if (is_partly(*ref)) {
     const SeenVoxels& seen = view_.partly[payload(*ref)];
     for (int32_t i = 0; i < kBlockVoxels; ++i) {
       if (!seen.has(i)) continue;

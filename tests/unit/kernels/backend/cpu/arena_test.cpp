@@ -1,6 +1,7 @@
 #include "kernels/backend/cpu/arena.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/mman.h>
 
 #include <string>
 
@@ -43,6 +44,23 @@ TEST(Arena, MeasuresExactlyWhatItLaterGives) {
   for (double& x : parts.numbers) x = 1;
   for (const uint8_t b : parts.bytes) EXPECT_EQ(b, 0);
   for (int32_t i = 0; i < 63; ++i) EXPECT_EQ(parts.image.data[i], 0.0f);  // nothing overlaps
+}
+
+TEST(Arena, TouchesAllPagesButThoseForLater) {
+  constexpr uint64_t kPage = 4096, kPages = 64;
+  Arena arena((kPages + 2) * kPage);
+  ASSERT_FALSE(arena.failed());
+  const View<uint8_t> all = arena.take<uint8_t>("pages", kPages * kPage),
+                      more = arena.take<uint8_t>("more", 5);
+  all[3 * kPage] = 7;
+  arena.touch_all_but(all.data + 10 * kPage + 1, all.data + 50 * kPage);
+  unsigned char resident[kPages] = {};
+  ASSERT_EQ(mincore(all.data, kPages * kPage, resident), 0);
+  for (uint64_t page = 0; page < kPages; ++page)
+    EXPECT_EQ(resident[page] & 1, page <= 10 || page >= 50 ? 1 : 0) << page;
+  ASSERT_EQ(mincore(more.data, 1, resident), 0);
+  EXPECT_EQ(resident[0] & 1, 1);
+  EXPECT_EQ(all[3 * kPage], 7);
 }
 
 TEST(Arena, SaysWhenThereIsNoSuchMemory) {
