@@ -55,6 +55,30 @@ inline uint32_t first_looks(const EngineParams& p, int32_t empty_frames) {
   return static_cast<uint32_t>(std::max(VisibleGroupPass::kFirstLooks, empty_looks(p, empty_frames)));
 }
 
+/// How far a map has come from where it began.
+struct MapExtent {
+  Vec3 began_at;
+  float farthest_m = 0;
+
+  void see(const Se3& T_map_cam, bool first) {
+    if (first) *this = {T_map_cam.translation, 0.0f};
+    farthest_m = std::max(farthest_m, norm(T_map_cam.translation - began_at));
+  }
+  /// What of a map does not fit itself, for it grew along a path (mask.drift).
+  float drift_m(const MaskParams& mask) const { return std::min(mask.drift * farthest_m, kMostDriftM); }
+
+ private:
+  static constexpr float kMostDriftM = 0.04f;  ///< beyond it a mover could hide
+};
+/// A surface contradicts a map only where it is farther off than that may have drifted, and a strip of that
+/// width along an edge is nothing.
+inline MaskParams allowing(MaskParams mask, float drift_m) {
+  constexpr float kStripM = 0.5f;
+  mask.contradict_m += drift_m;
+  mask.blob_m2 += kStripM * drift_m;
+  return mask;
+}
+
 /// Neighbouring points err together, the more of them the finer the samples.
 inline float correlated_points(const EngineParams& p) {
   const float pixels = static_cast<float>(p.camera.k.width) * static_cast<float>(p.camera.k.height);
@@ -112,14 +136,15 @@ inline CellEvidencePass evidence_pass(const EngineParams& params, const VolumeVi
   TrackPass track = track_pass_at(params, map, T_map_cam);
   track.k = cells.k;
   set_kernel(params, kCoarsest, track.weights);
-  const MaskParams& p = params.mask;
+  const MaskParams p = allowing(params.mask, cells.drift_m);
   return {cells,
           track,
           noise,
           p.contradict_m,
           p.contradict_sigmas,
           empty_looks(params, empty_frames),
-          static_cast<int32_t>(std::lround(p.empty_reach_m / params.map.voxel_m))};
+          static_cast<int32_t>(std::lround(p.empty_reach_m / params.map.voxel_m)),
+          static_cast<int32_t>(std::lround(cells.drift_m / params.map.voxel_m))};
 }
 
 /// The pose of the camera after an increment about its centre (see TrackPass).

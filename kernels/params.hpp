@@ -188,6 +188,7 @@ struct MaskParams {
   int32_t empty_looks = 1;
   float empty_s = 0.0f;
   float empty_reach_m = 0.0f;
+  float drift = 0.001f;
   float reabsorb_s = 1.0f;
 
   template <class F>
@@ -231,6 +232,9 @@ struct MaskParams {
     f("empty_s", &P::empty_s, 0, 8.0, "s", "ours", "and for so long, at the rate of the frames");
     f("empty_reach_m", &P::empty_reach_m, 0, 0.5, "m", "ours",
       "and so were its six neighbours at this distance; 0: they are not asked");
+    f("drift", &P::drift, 0, 0.1, "share", "ours",
+      "parts: of how far the camera has been from where the map begins, at most 4 cm: so much a map may not "
+      "fit itself, and what lies off it by no more has moved only if it did against earlier frames, too");
     f("reabsorb_s", &P::reabsorb_s, 0, 600.0, "s", "ours",
       "what contradicts the map but stood still in view for so long is static; 0: never");
   }

@@ -100,6 +100,7 @@ struct CellGrid {
   ImageView<uint8_t> dynamic;   ///< 0: static, kDoubted, kTouched, or 255: dynamic
   ImageView<uint8_t> expected;  ///< kDoubted, or dynamic by the last frame's mask, carried into this one
   int32_t settled_frames = 0;   ///< mask.reabsorb_s: what is still for so many is static; 0: never
+  float drift_m = 0;            ///< how far the map may not fit itself, see mask.drift
   ImageView<int32_t> part;      ///< number of the connected part a cell belongs to; < 0: none
 
   STILLMAP_HD Vec3 point(int32_t row, int32_t col) const {
@@ -192,6 +193,7 @@ struct CellEvidencePass {
   float contradict_sigmas;
   int32_t empty_looks = 1;         ///< space that was seen free less often says nothing
   int32_t empty_reach_voxels = 0;  ///< and so its neighbours; 0: they are not asked
+  int32_t drift_voxels = 0;        ///< free space this near to a mapped surface says nothing either
 
   template <class Cache>
   STILLMAP_HD void operator()(int32_t row, int32_t col, Cache& cache) const {
@@ -236,16 +238,32 @@ struct CellEvidencePass {
     const BlockAt block = lookup(track.map, pack(block_of_voxel(voxel)), cache);
     return block ? block.record(index_in_block(voxel)) : VoxelRecord{};
   }
+  template <class Cache>
+  STILLMAP_HD VoxelSurface surface_at(Int3 voxel, Cache& cache) const {
+    const BlockAt block = lookup(track.map, pack(block_of_voxel(voxel)), cache);
+    return block ? block.surface(index_in_block(voxel)) : VoxelSurface{};
+  }
   /// Seen often enough, here and around: what was looked at once may have been noise, or a hole in a mover.
+  /// Beside a thing whose other side was not seen yet, a map that has drifted has free space where that is.
   template <class Cache>
   STILLMAP_HD bool reliably_empty(Int3 voxel, Cache& cache) const {
     if (record_at(voxel, cache).weight < empty_looks) return false;
-    const int32_t reach = empty_reach_voxels;
-    for (int32_t i = 0; reach > 0 && i < 6; ++i) {
-      const int32_t step = i & 1 ? reach : -reach, axis = i >> 1;
-      const Int3 neighbour = {voxel.x + (axis == 0 ? step : 0), voxel.y + (axis == 1 ? step : 0),
-                              voxel.z + (axis == 2 ? step : 0)};
-      if (record_at(neighbour, cache).weight < empty_looks) return false;
+    const bool seen_around = all_around(voxel, empty_reach_voxels, [&](Int3 neighbour) {
+      return record_at(neighbour, cache).weight >= empty_looks;
+    });
+    return seen_around && all_around(voxel, drift_voxels, [&](Int3 neighbour) {
+             const VoxelSurface surface = surface_at(neighbour, cache);
+             return surface.sdf == kSdfUnobserved || surface.sdf > 0;
+           });
+  }
+  /// Of the six neighbours at a distance, 0: none.
+  template <class F>
+  STILLMAP_HD static bool all_around(Int3 voxel, int32_t distance, const F& holds) {
+    for (int32_t i = 0; distance > 0 && i < 6; ++i) {
+      const int32_t step = i & 1 ? distance : -distance, axis = i >> 1;
+      if (!holds(Int3{voxel.x + (axis == 0 ? step : 0), voxel.y + (axis == 1 ? step : 0),
+                      voxel.z + (axis == 2 ? step : 0)}))
+        return false;
     }
     return true;
   }

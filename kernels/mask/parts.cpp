@@ -15,6 +15,8 @@ constexpr float kOnePlaneM = 0.01f;  ///< and so are cells this near to each oth
 constexpr float kSettledShare = 0.6f;  ///< of a part that stands still: the rest is its rim
 constexpr float kStillMovesShare =
     0.6f;  ///< of the offset that shows a mover keeps it one: it may swing back
+constexpr float kSlidShare =
+    0.6f;  ///< of what it may lie off: so much a part has slid that moved, and not the map under it
 constexpr float kHardlyKnownShare = 0.2f;  ///< of a part: the map knows too little to say what it is
 constexpr double kNearShare =
     0.5;  ///< of a part must lie near a mapped surface, that it can have moved from it
@@ -234,6 +236,7 @@ void gather_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory
   for (int32_t i = 0; i < parts; ++i) {
     Part& part = memory.parts[static_cast<uint32_t>(i)];
     if (part.cells > 0) part.noise_m /= static_cast<float>(part.cells);
+    part.near_map = part.motion.sum[kPoints] > kNearShare * part.cells;
   }
 }
 
@@ -300,8 +303,7 @@ float usual_offset(int32_t parts, const PartMemory& memory, const MaskParams& pa
 }
 
 bool has_moved(const Part& part, const MaskParams& params, float usual) {
-  const bool near = part.motion.sum[kPoints] > kNearShare * part.cells;
-  return params.moved_m > 0.0f && part.area_m2 >= params.moved_m2 && near &&
+  return params.moved_m > 0.0f && part.area_m2 >= params.moved_m2 && part.near_map &&
          part.moved_m > may_move_m(part, params) * usual;
 }
 
@@ -352,16 +354,37 @@ Twistd agree_on_motion(int32_t parts, const PartMemory& memory, const MaskParams
 
 namespace {
 
+/// By the last mask.
+bool was_dynamic(const Part& part, const MaskParams& params) {
+  return params.warp && 2 * part.expected > part.cells;
+}
+/// The usual offset beyond which it is off its place.
+float usual_for(const Part& part, const MaskParams& params, float usual) {
+  return was_dynamic(part, params) ? kStillMovesShare * usual : usual;
+}
+
+}  // namespace
+
+bool needs_slide(const Part& part, const CellGrid& cells, const MaskParams& params, float usual) {
+  const float off = usual_for(part, params, usual);
+  return !stands(part) && has_moved(part, params, off) &&
+         part.moved_m <= may_move_m(part, params) * off + cells.drift_m;
+}
+
+namespace {
+
 /// What stands still is static, though it contradicts the map or lies off it: the map will learn it.
-void decide(Part& part, const MaskParams& params, float usual, bool believe_moves) {
-  const bool was = params.warp && 2 * part.expected > part.cells;
+void decide(Part& part, const CellGrid& cells, const MaskParams& params, float usual, bool believe_moves) {
+  const bool was = was_dynamic(part, params);
   const bool hardly_known = part.known < kHardlyKnownShare * static_cast<float>(part.cells);
   const float share = part.known > 0 ? part.contradicts / part.known : 0.0f;
   const float limit = was && !hardly_known ? params.share_off : params.share_on;
   const bool contradicts = part.contradicts_m2 >= params.blob_m2 && share > limit;
   const bool stood = stands(part);
-  const bool seems_moved =
-      !stood && believe_moves && has_moved(part, params, was ? kStillMovesShare * usual : usual);
+  const bool slid = part.slid_m > kSlidShare * may_move_m(part, params);
+  const bool seems_moved = !stood && believe_moves &&
+                           has_moved(part, params, usual_for(part, params, usual)) &&
+                           (slid || !needs_slide(part, cells, params, usual));
   // Noise, or the other side of a thin thing, lies off for one frame: what moves does so in the next one too.
   const bool twice = !params.warp || 2 * part.expected_or_doubted > part.cells;
   part.moved = seems_moved && twice;
@@ -381,7 +404,7 @@ void decide_parts(const CellGrid& cells, int32_t parts, const PartMemory& memory
   const bool believe_moves = moved_share(parts, memory, params, usual) < kMostOfTheSpace;
   for (int32_t i = 0; i < parts; ++i) {
     Part& part = memory.parts[static_cast<uint32_t>(i)];
-    decide(part, params, usual, believe_moves);
+    decide(part, cells, params, usual, believe_moves);
   }
   const auto part_of = [&](int32_t r, int32_t c) -> const Part& {
     return memory.parts[static_cast<uint32_t>(cells.part.at(r, c))];

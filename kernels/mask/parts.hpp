@@ -8,6 +8,9 @@
 
 namespace stillmap {
 
+/// Frames that are kept; the oldest is mask.reabsorb_s old, or a third more.
+constexpr int32_t kEarlier = 4;
+
 /// What is known of one connected part of the picture.
 struct Part {
   int32_t cells = 0, expected = 0;
@@ -19,7 +22,12 @@ struct Part {
   float area_m2 = 0, contradicts_m2 = 0;  ///< as seen; of what contradicts
   float noise_m = 0;                      ///< mean of the cells' noise
   NormalEq motion;                        ///< its own least squares by the motion of the camera
-  float moved_m = 0;     ///< how far its surface lies off where the whole picture would have it
+  bool near_map = false;        ///< most of it lies near a mapped surface, from which it can have moved
+  float moved_m = 0;            ///< how far its surface lies off where the whole picture would have it
+  int32_t there = 0, came = 0;  ///< cells where an earlier frame saw a surface, or free space
+  /// By earlier frame: how far it lies off its place in that one; < 0: unknown.
+  float slides_m[kEarlier - 1] = {};
+  float slid_m = 0;      ///< the second largest of them
   bool moved = false;    ///< farther than it may
   bool doubted = false;  ///< for the first time: once more, and it has moved
   bool dynamic = false;
@@ -49,6 +57,10 @@ void for_cells_of(const CellGrid& cells, int32_t i, const Part& part, const F& f
     for (int32_t c = part.col0; c < part.col1; ++c)
       if (cells.part.at(r, c) == i) f(r, c);
 }
+
+/// Whether it lies off so little that the map itself may not fit, and only what it did since it was seen
+/// before can tell whether it moved (measure_slides).
+bool needs_slide(const Part& part, const CellGrid& cells, const MaskParams& params, float usual);
 
 /// How far the surface of a part may seem to lie off its place.
 inline float may_move_m(const Part& part, const MaskParams& params) {

@@ -57,25 +57,43 @@ struct Slide {
   }
 };
 
+/// Where a cell would be in an earlier frame, and what that frame saw there.
+struct Sight {
+  Vec3 p, was;  ///< camera of the earlier frame, metres
+  Pixel at;
+};
+
+/// @return false: that place was out of view, or not measured
+bool look_back(const CellGrid& cells, int32_t r, int32_t c, const EarlierCells& earlier,
+               const Se3& T_earlier_now, Sight& sight) {
+  sight.p = T_earlier_now * cells.point(r, c);
+  if (sight.p.z < kNearestM) return false;
+  sight.at = project(cells.k, sight.p);
+  const int32_t er = static_cast<int32_t>(std::floor(sight.at.v + 0.5f)),
+                ec = static_cast<int32_t>(std::floor(sight.at.u + 0.5f));
+  if (!earlier.depth_m.contains(er, ec) || earlier.depth_m.at(er, ec) <= 0.0f) return false;
+  sight.was = unproject(cells.k, static_cast<float>(ec), static_cast<float>(er), earlier.depth_m.at(er, ec));
+  return true;
+}
+
+/// Of the brightness that the earlier frame shows, by the point.
+Vec3 gradient_of(const LumaAt& luma, const CellGrid& cells, Vec3 p) {
+  const float u = cells.k.fx * luma.across / p.z, v = cells.k.fy * luma.down / p.z;
+  return {u, v, -(u * p.x + v * p.y) / p.z};
+}
+
 /// One cell against the earlier frame: its surface along the normal, its brightness along the picture.
 void add_cell(const CellGrid& cells, int32_t r, int32_t c, const EarlierCells& earlier,
               const Se3& T_earlier_now, const DepthNoise& noise, Slide& slide) {
-  const Vec3 p = T_earlier_now * cells.point(r, c);
-  if (p.z < kNearestM) return;
-  const Pixel at = project(cells.k, p);
-  const int32_t er = static_cast<int32_t>(std::floor(at.v + 0.5f)),
-                ec = static_cast<int32_t>(std::floor(at.u + 0.5f));
-  if (!earlier.depth_m.contains(er, ec) || std::fabs(earlier.depth_m.at(er, ec) - p.z) > depth_edge_m(p.z))
-    return;
-  const Vec3 was =
-      unproject(cells.k, static_cast<float>(ec), static_cast<float>(er), earlier.depth_m.at(er, ec));
+  Sight sight;
+  if (!look_back(cells, r, c, earlier, T_earlier_now, sight)) return;
+  const Vec3 p = sight.p;
+  if (std::fabs(sight.was.z - p.z) > depth_edge_m(p.z)) return;
   const Vec3 n = T_earlier_now.rotation * cells.normal.at(r, c);
-  if (dot(n, n) > 0.5f) slide.add(n, dot(n, p - was), noise.at(p.z));
-  const LumaAt luma = luma_at(earlier, at, p.z);
+  if (dot(n, n) > 0.5f) slide.add(n, dot(n, p - sight.was), noise.at(p.z));
+  const LumaAt luma = luma_at(earlier, sight.at, p.z);
   if (!luma.known) return;
-  const float u = cells.k.fx * luma.across / p.z, v = cells.k.fy * luma.down / p.z;
-  const Vec3 gradient = {u, v, -(u * p.x + v * p.y) / p.z};
-  slide.add(gradient, luma.value - cells.luma.at(r, c) * (1.0f / kLumaScale), kLumaSigma);
+  slide.add(gradient_of(luma, cells, p), luma.value - cells.luma.at(r, c) * (1.0f / kLumaScale), kLumaSigma);
 }
 
 // The least squares above see no farther than the pattern is smooth: what slid by more than the width of a
@@ -174,6 +192,97 @@ void restart_sliding(const CellGrid& cells, int32_t parts, const PartMemory& mem
     const EarlierCells& then = earlier.at(later);
     restart_sliding(cells, parts, memory, params, noise, then, inverse(then.T_map_cam) * T_map_now, frames);
     frames = earlier.age(later);
+  }
+}
+
+namespace {
+
+constexpr float kMisplacedM = 0.02f;    ///< without noise: what lies farther off hardly pulls
+constexpr float kColourWeight = 0.05f;  ///< w_c of the paper
+constexpr float kFarM = 1.0f;           ///< slide of what is where nothing was
+
+/// A cell against an earlier frame, as CellEvidencePass compares it with the map.
+CellResidual residual_since(const CellGrid& cells, int32_t r, int32_t c, const EarlierCells& earlier,
+                            const Se3& T_earlier_now, const DepthNoise& noise, const Sight& sight) {
+  CellResidual residual = {};
+  PointTerms<float>& terms = residual.terms;
+  residual.arm = sight.p - T_earlier_now.translation;
+  terms.depth_gradient = T_earlier_now.rotation * cells.normal.at(r, c);
+  terms.depth_residual_m = dot(terms.depth_gradient, sight.p - sight.was);
+  const float scale_m = kMisplacedM + kRobustSigmas * noise.at(sight.p.z);
+  terms.depth_weight = geman_mcclure(terms.depth_residual_m * terms.depth_residual_m, scale_m).weight;
+  const LumaAt luma = luma_at(earlier, sight.at, sight.p.z);
+  if (!luma.known) return residual;
+  terms.colour_gradient = gradient_of(luma, cells, sight.p);
+  terms.colour_residual = luma.value - cells.luma.at(r, c) * (1.0f / kLumaScale);
+  terms.colour_weight = kColourWeight * terms.depth_weight;
+  return residual;
+}
+
+void add_cell_since(const CellGrid& cells, int32_t r, int32_t c, const EarlierCells& earlier,
+                    const Se3& T_earlier_now, const DepthNoise& noise, Part& part) {
+  Sight sight;
+  if (!look_back(cells, r, c, earlier, T_earlier_now, sight)) return;
+  const float edge_m = depth_edge_m(sight.p.z);
+  if (sight.was.z < sight.p.z - edge_m) return;  // something was before it
+  if (sight.was.z > sight.p.z + edge_m) {
+    ++part.came;
+    return;
+  }
+  ++part.there;
+  if (!(dot(cells.normal.at(r, c), cells.normal.at(r, c)) > 0.5f)) return;
+  const CellResidual residual = residual_since(cells, r, c, earlier, T_earlier_now, noise, sight);
+  NormalEqT<float> sums;
+  add_point(residual.terms, residual.arm, 1.0f, 1.0f, sums.sum);
+  part.motion.add(sums);
+}
+
+/// @return how far a part lies off its place in the earlier frame that was added; < 0: too little of it was
+/// seen
+float slide_since(const Part& part) {
+  if (2 * (part.there + part.came) < part.cells) return -1.0f;
+  return part.came > part.there ? kFarM : part.moved_m;
+}
+
+/// Of those that are known; 0: none is. One frame alone may have been matched badly.
+float second_largest(const float (&slides_m)[kEarlier - 1]) {
+  float most_m = -1.0f, second_m = -1.0f;
+  for (const float slide_m : slides_m) {
+    second_m = std::max(second_m, std::min(most_m, slide_m));
+    most_m = std::max(most_m, slide_m);
+  }
+  return std::max(second_m >= 0.0f ? second_m : most_m, 0.0f);
+}
+
+}  // namespace
+
+void measure_slides(const CellGrid& cells, int32_t parts, const PartMemory& memory, const MaskParams& params,
+                    const DepthNoise& noise, const EarlierFrames& earlier, const Se3& T_map_now,
+                    float usual) {
+  const View<Part> all = {memory.parts.data, static_cast<uint32_t>(parts)};
+  if (std::none_of(all.begin(), all.end(),
+                   [&](const Part& part) { return needs_slide(part, cells, params, usual); }))
+    return;
+  for (Part& part : all) part.slid_m = part.moved_m;  // kept there meanwhile
+  for (int32_t later = 1; later < kEarlier; ++later) {
+    for (Part& part : all) {
+      part.motion = {};
+      part.there = part.came = 0;
+      part.moved_m = 0;
+    }
+    const EarlierCells& then = earlier.at(later);
+    const Se3 T_then_now = inverse(then.T_map_cam) * T_map_now;
+    for (int32_t r = 0; r < cells.part.rows; ++r)
+      for (int32_t c = 0; c < cells.part.cols; ++c)
+        if (const int32_t i = cells.part.at(r, c); i >= 0)
+          add_cell_since(cells, r, c, then, T_then_now, noise, all[static_cast<uint32_t>(i)]);
+    float usual_since = 1.0f;
+    agree_on_motion(parts, memory, params, usual_since);
+    for (Part& part : all) part.slides_m[later - 1] = slide_since(part);
+  }
+  for (Part& part : all) {
+    part.moved_m = part.slid_m;
+    part.slid_m = second_largest(part.slides_m);
   }
 }
 

@@ -14,9 +14,6 @@ struct EarlierCells {
   Se3 T_map_cam;
 };
 
-/// Frames that are kept; the oldest is mask.reabsorb_s old, or a third more.
-constexpr int32_t kEarlier = 4;
-
 /// The frames that were kept, one of every `masks_between` masks, in a ring.
 struct EarlierFrames {
   const EarlierCells* ring;  ///< kEarlier of them
@@ -46,5 +43,12 @@ void restart_sliding(const CellGrid& cells, int32_t parts, const PartMemory& mem
 /// @param T_map_now pose of this camera, by the motion that most of the space agrees on
 void restart_sliding(const CellGrid& cells, int32_t parts, const PartMemory& memory, const MaskParams& params,
                      const DepthNoise& noise, const EarlierFrames& earlier, const Se3& T_map_now);
+
+/// Fills Part::slid_m, if some part needs it: parts are compared with each of the frames that were kept as
+/// they were with the map, and agree on a motion since. What lies off its place in the map but not in most of
+/// those frames has not moved: the map does not fit. Uses Part::motion.                    test: slide_test
+/// @param usual see agree_on_motion
+void measure_slides(const CellGrid& cells, int32_t parts, const PartMemory& memory, const MaskParams& params,
+                    const DepthNoise& noise, const EarlierFrames& earlier, const Se3& T_map_now, float usual);
 
 }  // namespace stillmap

@@ -285,6 +285,7 @@ class CpuEngine final : public Engine {
   Se3 T_before_;                   ///< pose of the last mask
   uint32_t masks_ = 0;             ///< masks made since the map was empty
   bool continued_ = false;         ///< the map, or part of it, is older than this engine
+  MapExtent extent_;
 };
 
 /// The first frame makes thousands of blocks: it need not wait for the system to find memory for each. What
@@ -386,23 +387,27 @@ void CpuEngine::mask_by_parts(const Se3& T_map_cam) {
   CellGrid& cells = memory_.cells;
   cells.settled_frames = params_.mask.reabsorb_s > 0 ? reabsorb_frames() : 0;
   const DepthNoise noise = depth_noise(params_.depth, k());
+  extent_.see(T_map_cam, masks_ == 0);
+  cells.drift_m = extent_.drift_m(params_.mask);
+  const MaskParams params = allowing(params_.mask, cells.drift_m);
   const CellEvidencePass evidence =
-      evidence_pass(params_, memory_.map.view(), cells, T_map_cam, noise, frames_in(params_.mask.empty_s));
+      evidence_pass(params_, memory_.map.view(), cells, T_map_cam, noise, frames_in(params.empty_s));
   in_row_tiles(cells.depth_m.rows,
                [&](int32_t first, int32_t last) { loops_.cell_evidence(evidence, first, last); });
   const StillPass still{cells, memory_.before, inverse(T_before_) * T_map_cam, noise, reabsorb_frames() / 2};
   in_row_tiles(cells.depth_m.rows,
                [&](int32_t first, int32_t last) { loops_.still_cells(still, first, last); });
   in_row_tiles(cells.depth_m.rows, [&](int32_t first, int32_t last) {
-    find_bends(cells, memory_.part_memory, params_.mask, first, last);
+    find_bends(cells, memory_.part_memory, params, first, last);
   });
   const int32_t parts = segment(cells, memory_.part_memory, noise);
   gather_parts(cells, parts, memory_.part_memory, noise);
-  const Twistd motion = agree_on_motion(parts, memory_.part_memory, params_.mask, usual_);
+  const Twistd motion = agree_on_motion(parts, memory_.part_memory, params, usual_);
   const Se3 T_agreed = moved_about_centre(T_map_cam, motion);
-  restart_sliding(cells, parts, memory_.part_memory, params_.mask, noise,
-                  EarlierFrames{&memory_.earlier[0], masks_, masks_between_earlier()}, T_agreed);
-  decide_parts(cells, parts, memory_.part_memory, params_.mask, usual_);
+  const EarlierFrames earlier{&memory_.earlier[0], masks_, masks_between_earlier()};
+  restart_sliding(cells, parts, memory_.part_memory, params, noise, earlier, T_agreed);
+  measure_slides(cells, parts, memory_.part_memory, params, noise, earlier, T_agreed, usual_);
+  decide_parts(cells, parts, memory_.part_memory, params, usual_);
   const DynamicPixelPass pixels{cells, memory_.depth_m, memory_.mask};
   in_row_tiles(k().height, [&](int32_t first, int32_t last) { loops_.dynamic_pixels(pixels, first, last); });
   write_trust(memory_.mask, finest_step(params_));

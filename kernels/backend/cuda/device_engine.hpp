@@ -529,6 +529,7 @@ class DeviceEngine : public Engine {
   Se3 T_before_;                   ///< pose of the last mask
   uint32_t masks_ = 0;             ///< masks made since the map was empty
   bool continued_ = false;         ///< the map, or part of it, is older than this engine
+  MapExtent extent_;
 };
 
 }  // namespace stillmap

@@ -292,8 +292,10 @@ MaskResult DeviceEngine<Device>::mask(const Se3& T_world_cam) {
 template <class Device>
 bool DeviceEngine<Device>::find_parts(const Se3& T_map_cam) {
   const DepthNoise noise = depth_noise(params_.depth, k());
-  const MaskParams& p = params_.mask;
+  extent_.see(T_map_cam, masks_ == 0);
   CellGrid cells = d_.cells.grid;
+  cells.drift_m = extent_.drift_m(params_.mask);
+  const MaskParams p = allowing(params_.mask, cells.drift_m);
   cells.settled_frames = p.reabsorb_s > 0 ? reabsorb_frames() : 0;
   DeviceStates::Evidence& state = h_.states->evidence;
   state.evidence = evidence_pass(params_, d_.map.view, cells, T_map_cam, noise, frames_in(p.empty_s));
@@ -301,13 +303,15 @@ bool DeviceEngine<Device>::find_parts(const Se3& T_map_cam) {
   if (!play(DeviceStep::evidence)) return false;
   CellGrid& found = h_.cells.grid;
   found.settled_frames = cells.settled_frames;
+  found.drift_m = cells.drift_m;
   find_bends(found, h_.part_memory, p, 0, found.depth_m.rows);
   const int32_t parts = segment(found, h_.part_memory, noise);
   gather_parts(found, parts, h_.part_memory, noise);
   const Twistd motion = agree_on_motion(parts, h_.part_memory, p, usual_);
   const Se3 T_agreed = moved_about_centre(T_map_cam, motion);
-  restart_sliding(found, parts, h_.part_memory, p, noise,
-                  EarlierFrames{&h_.earlier[0], masks_, masks_between_earlier()}, T_agreed);
+  const EarlierFrames earlier{&h_.earlier[0], masks_, masks_between_earlier()};
+  restart_sliding(found, parts, h_.part_memory, p, noise, earlier, T_agreed);
+  measure_slides(found, parts, h_.part_memory, p, noise, earlier, T_agreed, usual_);
   decide_parts(found, parts, h_.part_memory, p, usual_);
   return true;
 }

@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "kernels/frame_rules.hpp"
 #include "kernels/mask/cells.hpp"
 #include "tests/support/corner_scene.hpp"
 
@@ -100,6 +101,49 @@ TEST_F(EvidenceTest, SpaceIsEmptyOnceItWasSeenOftenHereAndAround) {
   }
   look(kRow, kCol);
   EXPECT_EQ(cells.evidence.at(kRow, kCol), 1.0f);
+}
+
+TEST_F(EvidenceTest, InAMapThatDriftedSpaceIsEmptyOnlyAwayFromItsSurfaces) {
+  cells.depth_m.at(kRow, kCol) -= 0.075f;
+  const Vec3 p = cells.point(kRow, kCol);
+  const auto nearest = [](float m) { return static_cast<int32_t>(std::lround(m / kEvidenceVoxelM)); };
+  const Int3 beside = {nearest(p.x) - 2, nearest(p.y), nearest(p.z)};
+  pass.drift_voxels = 2;
+  look(kRow, kCol);
+  EXPECT_EQ(cells.evidence.at(kRow, kCol), 1.0f);
+  map.surface(beside).sdf = kSdfUnobserved;
+  look(kRow, kCol);
+  EXPECT_EQ(cells.evidence.at(kRow, kCol), 1.0f) << "nobody looked there: no surface is known";
+  map.surface(beside).sdf = -1;
+  look(kRow, kCol);
+  EXPECT_EQ(cells.evidence.at(kRow, kCol), kUnknown);
+  pass.drift_voxels = 1;
+  look(kRow, kCol);
+  EXPECT_EQ(cells.evidence.at(kRow, kCol), 1.0f) << "it drifted by less";
+}
+
+TEST(MapExtent, DriftIsAShareOfTheFarthestWayFromWhereTheMapBegan) {
+  MaskParams mask;
+  mask.drift = 0.002f;
+  MapExtent extent;
+  const auto drift_at = [&](float x_m, bool first = false) {
+    extent.see({{}, {x_m, 0, 0}}, first);
+    return extent.drift_m(mask);
+  };
+  EXPECT_EQ(drift_at(5, true), 0.0f);
+  EXPECT_NEAR(drift_at(15), 0.02f, 1e-6f);
+  EXPECT_NEAR(drift_at(10), 0.02f, 1e-6f) << "the way back does not mend it";
+  EXPECT_NEAR(drift_at(100), 0.04f, 1e-6f) << "and there is a most of it";
+  EXPECT_EQ(drift_at(100, true), 0.0f) << "a new map";
+}
+
+TEST(MapExtent, WhatDriftMayHaveDoneIsNoMotion) {
+  MaskParams mask;
+  mask.contradict_m = 0.05f;
+  mask.blob_m2 = 0.004f;
+  const MaskParams drifted = allowing(mask, 0.02f);
+  EXPECT_NEAR(drifted.contradict_m, 0.07f, 1e-6f);
+  EXPECT_NEAR(drifted.blob_m2, 0.014f, 1e-6f);
 }
 
 TEST_F(EvidenceTest, ASurfaceThatMovedAwayNeedsNoEmptySpace) {

@@ -125,5 +125,71 @@ TEST_F(SlideTest, WhatSlidBeforeAFrameHasStoodStillSinceThat) {
      [&](int32_t r, int32_t c) { EXPECT_EQ(cells.still.at(r, c), 15); });  // since mask 30, 15 masks ago
 }
 
+/// The box lies a centimetre off its place in a map that may have drifted by two, and so it did a frame ago.
+class DriftTest : public SlideTest {
+ protected:
+  DriftTest() {
+    put(kBox, kNearM, 0);
+    in(kBox, [&](int32_t r, int32_t c) { cells.still.at(r, c) = 0; });
+    shift({0, kRows, 0, kCols}, {});
+    shift(kBox, {0, 0, 0.012f});
+    expect(kBox, kDoubted);
+    params.moved_m2 = 0.01f;
+    params.grow_m = 0;
+    cells.drift_m = 0.02f;
+  }
+  /// Dynamic cells of the box; `stood` of the three frames that are kept saw it where it is, the others
+  /// elsewhere.
+  int32_t dynamic_after(int32_t stood, Vec3 elsewhere_m) {
+    earlier_at(elsewhere_m);
+    std::vector<float> moved_depth(earlier.depth_m.data, earlier.depth_m.data + kRows * kCols);
+    std::vector<float> moved_luma(earlier.luma.data, earlier.luma.data + kRows * kCols);
+    earlier_at({});
+    std::vector<EarlierCells> ring(kEarlier, earlier);
+    for (int32_t slot = 1 + stood; slot < kEarlier; ++slot) {
+      ring[static_cast<size_t>(slot)].depth_m.data = moved_depth.data();
+      ring[static_cast<size_t>(slot)].luma.data = moved_luma.data();
+    }
+    const int32_t count = find_parts();
+    gather_parts(cells, count, memory, noise);
+    agree_on_motion(count, memory, params, usual);
+    const float off_map_m = box().moved_m;
+    measure_slides(cells, count, memory, params, noise, {ring.data(), 40, 10}, {}, usual);
+    EXPECT_EQ(box().moved_m, off_map_m);
+    slid_m = box().slid_m;
+    decide_parts(cells, count, memory, params, usual);
+    return dynamic_cells(kBox);
+  }
+  const Part& box() { return memory.parts[static_cast<uint32_t>(cells.part.at(30, 40))]; }
+
+  float slid_m = 0;
+};
+
+TEST_F(DriftTest, WhatLiesOffTheMapAloneHasNotMoved) {
+  EXPECT_EQ(dynamic_after(3, {}), 0);
+  EXPECT_LT(slid_m, 0.001f);
+}
+
+TEST_F(DriftTest, WhatLiesOffItsEarlierPlacesTooHasMoved) {
+  EXPECT_EQ(dynamic_after(0, {0, 0, 0.012f}), 400);
+  EXPECT_NEAR(slid_m, 0.012f, 0.002f);
+}
+
+TEST_F(DriftTest, OneFrameMayHaveBeenMatchedBadly) {
+  EXPECT_EQ(dynamic_after(2, {0, 0, 0.012f}), 0);
+  EXPECT_EQ(dynamic_after(1, {0, 0, 0.012f}), 400);
+}
+
+TEST_F(DriftTest, WhatStandsWhereNothingWasHasMoved) {
+  EXPECT_EQ(dynamic_after(0, {0, 0, 1.0f}), 400);
+  EXPECT_GT(slid_m, 0.5f);
+}
+
+TEST_F(DriftTest, FartherThanTheMapCanHaveDriftedNobodyAsks) {
+  cells.drift_m = 0;
+  EXPECT_EQ(dynamic_after(3, {}), 400);
+  EXPECT_EQ(slid_m, 0.0f);
+}
+
 }  // namespace
 }  // namespace stillmap
