@@ -1,5 +1,6 @@
 #include "drivers/camera/calibrated_source.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace stillmap {
@@ -28,14 +29,19 @@ Result<std::unique_ptr<FrameSource>> CalibratedSource::make(std::unique_ptr<Fram
 }
 
 Status CalibratedSource::next(RgbdFrame& frame, int32_t timeout_ms) {
-  if (!registration_) return source_->next(frame, timeout_ms);
-  const ImageView<uint16_t> registered = frame.depth_raw;
-  const int32_t rows = registration_->depth_rows(), cols = registration_->depth_cols();
-  frame.depth_raw = {depth_.data(), rows, cols, cols};
-  const Status status = source_->next(frame, timeout_ms);
-  if (status == Status::ok) registration_->run(frame.depth_raw, registered);
-  frame.depth_raw = registered;
+  const Status status = next_unfinished(frame, timeout_ms);
+  if (status == Status::ok) finish(frame);
   return status;
+}
+
+void CalibratedSource::finish(RgbdFrame& frame) {
+  source_->finish(frame);
+  if (!registration_) return;
+  const ImageView<uint16_t> depth_raw{depth_.data(), registration_->depth_rows(), registration_->depth_cols(),
+                                      registration_->depth_cols()};
+  for (int32_t row = 0; row < depth_raw.rows; ++row)
+    std::copy_n(frame.depth_raw.row(row), depth_raw.cols, depth_raw.row(row));
+  registration_->run(depth_raw, frame.depth_raw);
 }
 
 }  // namespace stillmap

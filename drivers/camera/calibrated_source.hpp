@@ -11,8 +11,8 @@
 
 namespace stillmap {
 
-/// A source as its calibration says. Depth that is not registered to colour is registered here, on the
-/// thread that reads the frames, before anybody else sees them: what is recorded is registered.
+/// A source as its calibration says. Depth that is not registered to colour is registered when a frame is
+/// finished, before anybody else sees it: what is recorded is registered.
 class CalibratedSource final : public FrameSource {
  public:
   /// @param depth_bias, depth_camera in place of what the source says
@@ -29,6 +29,10 @@ class CalibratedSource final : public FrameSource {
 
   const SourceInfo& info() const override { return info_; }
   Status next(RgbdFrame& frame, int32_t timeout_ms) override;
+  Status next_unfinished(RgbdFrame& frame, int32_t timeout_ms) override {
+    return source_->next_unfinished(frame, timeout_ms);
+  }
+  void finish(RgbdFrame& frame) override;
   std::vector<Vec3> truth_cloud() const override { return source_->truth_cloud(); }
   OdometryPort* odometry() override { return source_->odometry(); }
   bool live() const override { return source_->live(); }
@@ -44,7 +48,7 @@ class CalibratedSource final : public FrameSource {
   std::unique_ptr<FrameSource> source_;
   SourceInfo info_;  ///< depth_camera: none any more
   std::optional<DepthRegistration> registration_;
-  std::vector<uint16_t> depth_;  ///< of one frame, not registered
+  std::vector<uint16_t> depth_;  ///< of the frame that is being finished, not registered
 };
 
 }  // namespace stillmap

@@ -3,11 +3,13 @@
 #include <OpenNI.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <cstdarg>
 #include <cstdio>
 #include <cstring>
+#include <mutex>
 #include <utility>
 
 #include "drivers/camera/frame_pairing.hpp"
@@ -59,6 +61,26 @@ class DeviceWatch final : public ::openni::OpenNI::DeviceDisconnectedListener,
  private:
   const std::string uri_;
   std::atomic<bool> gone_{false};
+};
+
+/// Images of a camera that are done with. The library uses the heap when it gets one back; it gets them on
+/// its own thread, with the next image.
+class UsedImages final : public VideoStream::NewFrameListener {
+ public:
+  void add(VideoFrameRef& image) {
+    const std::lock_guard held(mutex_);
+    const auto room = std::find_if(used_.begin(), used_.end(), [](auto& used) { return !used.isValid(); });
+    if (room != used_.end()) *room = image;
+    image.release();
+  }
+  void onNewFrame(VideoStream&) override {
+    const std::lock_guard held(mutex_);
+    for (VideoFrameRef& used : used_) used.release();
+  }
+
+ private:
+  std::mutex mutex_;
+  std::array<VideoFrameRef, 2 * (Pairing::kPending + 1)> used_;  ///< all that can be held
 };
 
 const char* name_of(Pairing::Kind kind) {
@@ -139,6 +161,7 @@ struct RgbdDevice::State {
   Read read(int32_t timeout_ms);
   Read take(Pairing::Kind of, VideoFrameRef& image, int64_t arrived_ns);
   Read end();
+  void give_back(VideoFrameRef& image) { kind == Kind::camera ? used.add(image) : image.release(); }
   void count_missed(int index);
   bool unusable(Pairing::Kind of, const VideoFrameRef& image);
   [[gnu::format(printf, 2, 3)]] void say(const char* format, ...);
@@ -152,6 +175,8 @@ struct RgbdDevice::State {
   DeviceWatch watch;
   ::openni::Device device;
   VideoStream depth, colour;
+  UsedImages used;
+  bool listens = false;  ///< `used`
   int cols = 0, rows = 0;
   CameraModel camera;
   float units_per_m = 1000;
@@ -262,6 +287,11 @@ std::string RgbdDevice::State::prepare_player() {
 }
 
 std::string RgbdDevice::State::start() {
+  if (kind == Kind::camera) {
+    if (depth.addNewFrameListener(&used) != ::openni::STATUS_OK)
+      return "OpenNI2 does not tell of images (" + library_error() + ")";
+    listens = true;
+  }
   for (const auto of : {Pairing::kDepth, Pairing::kColour})
     if (stream(of).start() != ::openni::STATUS_OK)
       return std::string("the ") + name_of(of) + " stream does not start (" + library_error() + ")";
@@ -330,6 +360,8 @@ void RgbdDevice::State::close() {
   pairing.clear([](auto, VideoFrameRef&) {});
   for (VideoStream* each : {&depth, &colour})
     if (each->isValid()) each->stop();
+  if (listens) depth.removeNewFrameListener(&used);
+  used.onNewFrame(depth);
   for (VideoStream* each : {&depth, &colour})
     if (each->isValid()) each->destroy();
   if (device.isValid()) device.close();
@@ -374,7 +406,8 @@ RgbdDevice::Read RgbdDevice::State::take(Pairing::Kind of, VideoFrameRef& image,
   if (unusable(of, image)) return Read::bad;
   if (of == Pairing::kDepth) depth_arrived_ns = arrived_ns;
   const int64_t stamp_ns = ns_of(image) + (of == Pairing::kColour ? colour_offset_ns : 0);
-  pair_ready = pairing.add(of, stamp_ns, image, pair, [](auto, VideoFrameRef&) {});
+  pair_ready =
+      pairing.add(of, stamp_ns, image, pair, [this](auto, VideoFrameRef& alone) { give_back(alone); });
   image.release();
   if (!pair_ready) return Read::single;
   stamps = {pair.depth.stamp_ns, pair.colour.stamp_ns, depth_arrived_ns};
@@ -458,8 +491,8 @@ void RgbdDevice::copy_to(RgbdFrame& frame) {
 }
 
 void RgbdDevice::drop() {
-  state_->pair.depth.image.release();
-  state_->pair.colour.image.release();
+  state_->give_back(state_->pair.depth.image);
+  state_->give_back(state_->pair.colour.image);
   state_->pair_ready = false;
 }
 

@@ -32,7 +32,7 @@ void Capture::run() {
     if (!have_slot) have_slot = slots_.acquire(slot, kWait);
     if (!have_slot) continue;
     slots_[slot].frame().captured = {};
-    const Status status = source_.next(slots_[slot].frame(), static_cast<int32_t>(kWait.count()));
+    const Status status = source_.next_unfinished(slots_[slot].frame(), static_cast<int32_t>(kWait.count()));
     if (gone(status)) {
       wait_for_camera();
       continue;

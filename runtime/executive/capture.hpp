@@ -31,6 +31,9 @@ class Capture {
   /// Until the source ends, the limit is reached or `state.stop`.
   void run();
 
+  /// The rest of what the source does for a frame that was handed over.  @thread who takes the frames
+  void finish(RgbdFrame& frame) const { source_.finish(frame); }
+
   /// The last frame was handed over.
   bool ended() const { return ended_.load(std::memory_order_acquire); }
   /// What ended it; empty: it came to its end, or was told to stop. After `ended`.

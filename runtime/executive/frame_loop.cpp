@@ -38,11 +38,13 @@ void FrameLoop::run() {
 }
 
 void FrameLoop::work_on(uint32_t slot) {
-  const RgbdFrame& frame = p_.slots[slot].frame();
+  RgbdFrame& frame = p_.slots[slot].frame();
   FrameResult result;
   {
     const heap_guard::Scope armed;
-    const FrameWork work = work_for(frame);
+    const float finish_ms = finish(frame);
+    FrameWork work = work_for(frame);
+    work.finish_ms = finish_ms;
     decide(frame, work);
     if (p_.odometry) p_.odometry->begin_frame();
     result = p_.pipeline.process(frame, work, this);
@@ -67,6 +69,13 @@ void FrameLoop::work_on(uint32_t slot) {
 void FrameLoop::take_ranges() {
   if (p_.ranges == nullptr) return;
   for (RangeReading reading; p_.ranges->pop(reading);) ranges_.add(reading);
+}
+
+/// @return the time it took
+float FrameLoop::finish(RgbdFrame& frame) const {
+  const int64_t start_ns = monotonic_ns();
+  p_.capture.finish(frame);
+  return static_cast<float>(monotonic_ns() - start_ns) * 1e-6f;
 }
 
 FrameWork FrameLoop::work_for(const RgbdFrame& frame) {

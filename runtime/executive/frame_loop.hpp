@@ -62,6 +62,7 @@ class FrameLoop final : public PoseListener {
  private:
   void work_on(uint32_t slot);
   void take_ranges();
+  float finish(RgbdFrame& frame) const;
   FrameWork work_for(const RgbdFrame& frame);
   void decide(const RgbdFrame& frame, const FrameWork& work);
   void count_lateness(const FrameResult& result, const FrameWork& work);

@@ -102,7 +102,7 @@ FrameResult Pipeline::process(const RgbdFrame& frame, const FrameWork& work, Pos
   const PrepareResult prepared =
       engine_.prepare({frame.depth_raw, frame.colour, static_cast<float>(mean_period_s_)});
   result.status = prepared.status;
-  result.ms.prepare_ms = watch.lap_ms();
+  result.ms.prepare_ms = work.finish_ms + watch.lap_ms();
   if (prepared.status == Status::ok) {
     if (!have_map_)
       result = start_map(result);
@@ -115,7 +115,7 @@ FrameResult Pipeline::process(const RgbdFrame& frame, const FrameWork& work, Pos
     announce(result);
   }
   result.map = engine_.map_health();
-  result.ms.total_ms = total.total_ms();
+  result.ms.total_ms = work.finish_ms + total.total_ms();
   remember(result);
   return result;
 }

@@ -24,6 +24,7 @@ struct FrameWork {
   bool integrate = true;     ///< false: tracked, but not mapped
   int32_t finest_level = 0;  ///< of both registrations; 0: as configured
   float sonar_m = 0;         ///< what the sonar saw when the frame was taken; 0: nothing, or there is none
+  float finish_ms = 0;       ///< that finishing the frame took; part of preparing it
 };
 
 /// What is known after a frame. Plain data: it goes through queues.

@@ -68,6 +68,12 @@ class FrameSource {
   ///         unavailable: the source is gone
   virtual Status next(RgbdFrame& frame, int32_t timeout_ms) = 0;
 
+  /// As `next`, in two parts, so that a camera is read again at once: what takes long is left to `finish`,
+  /// which everybody calls who looks at the depth of a frame that this filled.
+  virtual Status next_unfinished(RgbdFrame& frame, int32_t timeout_ms) { return next(frame, timeout_ms); }
+  /// Does not allocate.  @thread one, also while the reader thread is in `next_unfinished`
+  virtual void finish(RgbdFrame& /*frame*/) {}
+
   /// Points of the true static surface (as it is at the end), source's world, metres; empty where unknown.
   /// @thread boot
   virtual std::vector<Vec3> truth_cloud() const { return {}; }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "runtime/core/heap_guard.hpp"
 #include "tests/support/contains.hpp"
 #include "tests/support/frame_memory.hpp"
 
@@ -53,6 +54,26 @@ TEST(CalibratedSource, RegistersWhatIsNotRegistered) {
   EXPECT_EQ(memory.frame.depth_raw.data, pixels) << "the frame's own memory";
   EXPECT_EQ(memory.frame.depth_raw.at(10, 60), 2000);
   EXPECT_EQ(memory.frame.depth_raw.at(10, 61), 0) << "three pixels of disparity";
+}
+
+TEST(CalibratedSource, RegistersWhenAFrameIsFinished) {
+  auto source = CalibratedSource::make(std::make_unique<WallSource>(), {}, to_the_left());
+  ASSERT_TRUE(source) << source.error();
+  test::FrameMemory memory((*source)->info()), at_once((*source)->info());
+  const uint16_t* const pixels = memory.frame.depth_raw.data;
+  ASSERT_EQ((*source)->next_unfinished(memory.frame, 0), Status::ok);
+  EXPECT_EQ(memory.frame.depth_raw.at(10, 61), 2000) << "as the camera gave it";
+  const uint64_t before = heap_guard::allocations();
+  {
+    const heap_guard::Scope armed;
+    (*source)->finish(memory.frame);
+  }
+  EXPECT_EQ(heap_guard::allocations(), before);
+  EXPECT_EQ(memory.frame.depth_raw.data, pixels) << "the frame's own memory";
+  ASSERT_EQ((*source)->next(at_once.frame, 0), Status::ok);
+  for (int32_t r = 0; r < 48; ++r)
+    for (int32_t c = 0; c < 64; ++c)
+      ASSERT_EQ(memory.frame.depth_raw.at(r, c), at_once.frame.depth_raw.at(r, c)) << r << " " << c;
 }
 
 TEST(CalibratedSource, PassesOnEverythingElse) {

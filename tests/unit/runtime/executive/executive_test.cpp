@@ -39,6 +39,29 @@ class SlowCamera final : public FrameSource {
 };
 constexpr double kSlowPeriod_ms = kPeriod_ms * SlowCamera::kTimes;
 
+/// Its frames have no depth until they are finished. One frame at a time.
+class UnfinishedCamera final : public FrameSource {
+ public:
+  explicit UnfinishedCamera(FrameSource& source) : source_(source) {}
+
+  const SourceInfo& info() const override { return source_.info(); }
+  Status next(RgbdFrame& frame, int32_t timeout_ms) override { return source_.next(frame, timeout_ms); }
+  Status next_unfinished(RgbdFrame& frame, int32_t timeout_ms) override {
+    const Status status = next(frame, timeout_ms);
+    uint16_t* const depth = frame.depth_raw.data;
+    depth_.assign(depth, depth + frame.depth_raw.rows * frame.depth_raw.cols);
+    std::fill_n(depth, depth_.size(), uint16_t{0});
+    return status;
+  }
+  void finish(RgbdFrame& frame) override { std::copy(depth_.begin(), depth_.end(), frame.depth_raw.data); }
+  void skip(uint32_t count) override { source_.skip(count); }
+  const std::string& error() const override { return source_.error(); }
+
+ private:
+  FrameSource& source_;
+  std::vector<uint16_t> depth_;
+};
+
 /// A camera that stops at one of its frames, by going away or by saying nothing, until it is opened again.
 class FlakyCamera final : public FrameSource {
  public:
@@ -249,7 +272,11 @@ class Executives : public testing::Test {
     PacedSource paced(slow_camera ? static_cast<FrameSource&>(slow) : *source);
     std::optional<FlakyCamera> flaky;
     if (trouble) flaky.emplace(paced, *trouble, kFramesBefore, reopen_failures);
-    FrameSource& frames = flaky ? static_cast<FrameSource&>(*flaky) : live ? paced : *source;
+    UnfinishedCamera unfinished(*source);
+    FrameSource& frames = flaky          ? static_cast<FrameSource&>(*flaky)
+                          : live         ? paced
+                          : in_two_parts ? unfinished
+                                         : *source;
     ExecutiveParts parts{frames, engine, pipeline, notebook, state, clock};
     parts.codec = &ear;
     parts.bus = &ear;
@@ -275,7 +302,7 @@ class Executives : public testing::Test {
   std::vector<Mode> modes;
   RangeSensor* sonar = nullptr;
   std::atomic<bool> stop{false};
-  bool keep_images = false, slow_camera = false;
+  bool keep_images = false, slow_camera = false, in_two_parts = false;
   test::EngineDelays delays;
   std::optional<FlakyCamera::Trouble> trouble;
   uint32_t reopen_failures = 0;
@@ -292,6 +319,14 @@ TEST_F(Executives, ARecordingIsWorkedThroughWithoutLosingAFrame) {
   EXPECT_EQ(state.frames_dropped, 0u);
   EXPECT_EQ(ear.count, 60u);  // a pose each
   EXPECT_EQ(ear.last.frame, 59u);
+}
+
+TEST_F(Executives, AFrameIsFinishedBeforeItIsWorkedOn) {
+  in_two_parts = true;
+  run("crowd,size=80x60,seconds=2", false, 20);
+  ASSERT_EQ(notebook.items.size(), 20u);
+  for (const RunItem& item : notebook.items) EXPECT_EQ(item.result.status, Status::ok);
+  EXPECT_EQ(notebook.items.back().result.state, TrackingState::good);
 }
 
 TEST_F(Executives, ItEndsAtTheLimitOfFrames) {
