@@ -3,8 +3,9 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
-#include <semaphore>
 #include <vector>
+
+#include "runtime/core/semaphore.hpp"
 
 namespace stillmap {
 
@@ -47,7 +48,7 @@ class BoundedQueue {
   std::vector<T> items_;
   alignas(64) std::atomic<uint64_t> first_{0};
   alignas(64) std::atomic<uint64_t> last_{0};
-  std::counting_semaphore<> filled_{0};
+  Semaphore filled_;
 };
 
 }  // namespace stillmap

@@ -28,7 +28,7 @@ uint64_t FrameSlot::bytes(const SourceInfo& info) {
   return pixels_of(info) * of_pixel;
 }
 
-FrameSlots::FrameSlots(const SourceInfo& info, uint32_t count) : freed_(0) {
+FrameSlots::FrameSlots(const SourceInfo& info, uint32_t count) {
   for (uint32_t i = 0; i < std::clamp(count, 1u, kMost); ++i) {
     slots_.push_back(std::make_unique<FrameSlot>(info));
     release(i);

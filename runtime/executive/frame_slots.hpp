@@ -4,9 +4,9 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
-#include <semaphore>
 #include <vector>
 
+#include "runtime/core/semaphore.hpp"
 #include "runtime/ports/frame_source.hpp"
 
 namespace stillmap {
@@ -51,7 +51,7 @@ class FrameSlots {
  private:
   std::vector<std::unique_ptr<FrameSlot>> slots_;
   std::atomic<uint64_t> free_{0};  ///< a bit each
-  std::counting_semaphore<> freed_;
+  Semaphore freed_;
 };
 
 /// Hands frames from one thread to another. At the start a few may wait, in their order: the first frame,
@@ -80,7 +80,7 @@ class FrameMailbox {
   /// A byte each, slot + 1, the oldest lowest.
   alignas(64) std::atomic<uint64_t> waiting_{0};
   std::atomic<uint32_t> most_{kMostWaiting};
-  std::counting_semaphore<> filled_{0};
+  Semaphore filled_;
 };
 
 }  // namespace stillmap

@@ -5,6 +5,7 @@
 //   lcm_probe bot-core URL            LCM's library and bot_core.pose_t alone
 //   lcm_probe commands URL            our subscriber
 //   lcm_probe odometry URL            our subscriber
+//   lcm_probe ages URL                LCM's library: how old poses are when their datagrams come
 //
 // Listeners end when their standard input does and nothing has come for a while.
 
@@ -16,9 +17,11 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <memory>
 #include <set>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "drivers/lcm/lcm.hpp"
 #include "tests/support/sample_messages.hpp"
@@ -143,13 +146,73 @@ int hear_odometry(const std::string& url) {
   return 0;
 }
 
+/// How long after its capture the datagram of each pose came, and how much of that was not work on its frame.
+class Ages {
+ public:
+  Ages() { late_ms_.reserve(kMost), ages_ms_.reserve(kMost); }
+
+  static void hear_pose(const lcm_recv_buf_t* buffer, const char*, void* self) {
+    PoseMessage pose;
+    auto& ages = *static_cast<Ages*>(self);
+    if (ages.codec_->decode(payload(buffer), pose) != Status::ok) return;
+    ages.utime_ = pose.utime;
+    ages.age_ms_ = 1e-3 * static_cast<double>(buffer->recv_utime - pose.utime.us);
+  }
+  static void hear_status(const lcm_recv_buf_t* buffer, const char*, void* self) {
+    StatusMessage s;
+    auto& ages = *static_cast<Ages*>(self);
+    if (ages.codec_->decode(payload(buffer), s) != Status::ok || s.utime.us != ages.utime_.us) return;
+    if (s.frame < kWarmUp || ages.ages_ms_.size() == kMost) return;
+    const auto work_ms = static_cast<double>(s.prepare_ms + s.track_ms + s.mask_ms + s.refine_ms);
+    ages.ages_ms_.push_back(ages.age_ms_);
+    ages.late_ms_.push_back(ages.age_ms_ - work_ms);
+  }
+  void print() {
+    const auto at = [](std::vector<double>& of, double share) {
+      std::sort(of.begin(), of.end());
+      return of.empty() ? -1 : of[static_cast<size_t>(share * static_cast<double>(of.size() - 1))];
+    };
+    std::printf("poses %zu age_ms %.2f p99 %.2f beyond_work_ms %.2f p99 %.2f spread_ms %.2f\n",
+                ages_ms_.size(), at(ages_ms_, 0.5), at(ages_ms_, 0.99), at(late_ms_, 0.5), at(late_ms_, 0.99),
+                at(late_ms_, 0.99) - at(late_ms_, 0.01));
+  }
+
+ private:
+  static constexpr uint32_t kWarmUp = 10;  ///< the first frame makes the map
+  static constexpr size_t kMost = 100000;
+
+  static View<const uint8_t> payload(const lcm_recv_buf_t* buffer) {
+    return {static_cast<const uint8_t*>(buffer->data), static_cast<uint32_t>(buffer->data_size)};
+  }
+
+  std::unique_ptr<MessageCodec> codec_ = make_lcm_codec();
+  Utime utime_;
+  double age_ms_ = 0;
+  std::vector<double> ages_ms_, late_ms_;
+};
+
+int hear_ages(const std::string& url) {
+  lcm_t* lcm = lcm_create(url.c_str());
+  if (!lcm) return 1;
+  Ages ages;
+  lcm_subscribe(lcm, kPoseChannel, Ages::hear_pose, &ages);
+  lcm_subscribe(lcm, kStatusChannel, Ages::hear_status, &ages);
+  say_ready();
+  for (Patience patience; patience.goes_on();)
+    if (lcm_handle_timeout(lcm, 50) > 0) patience.something_came();
+  lcm_destroy(lcm);
+  ages.print();
+  return 0;
+}
+
 int probe(int argc, char** argv) {
   const std::string mode = argc > 1 ? argv[1] : "";
   if (argc == 5 && mode == "publish") return publish(argv[2], std::atoi(argv[3]), std::atof(argv[4]));
   if (argc == 3 && mode == "bot-core") return hear_bot_core(argv[2]);
   if (argc == 3 && mode == "commands") return hear_commands(argv[2]);
   if (argc == 3 && mode == "odometry") return hear_odometry(argv[2]);
-  std::fputs("lcm_probe publish|bot-core|commands|odometry URL ...\n", stderr);
+  if (argc == 3 && mode == "ages") return hear_ages(argv[2]);
+  std::fputs("lcm_probe publish|bot-core|commands|odometry|ages URL ...\n", stderr);
   return 2;
 }
 
