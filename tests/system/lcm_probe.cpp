@@ -5,6 +5,7 @@
 //   lcm_probe bot-core URL            LCM's library and bot_core.pose_t alone
 //   lcm_probe commands URL            our subscriber
 //   lcm_probe odometry URL            our subscriber
+//   lcm_probe answers URL             LCM's library: what became of commands, as the status says
 //   lcm_probe ages URL                LCM's library: how old poses are when their datagrams come
 //
 // Listeners end when their standard input does and nothing has come for a while.
@@ -81,6 +82,10 @@ int publish(const std::string& url, int count, double hz) {
   return 0;
 }
 
+View<const uint8_t> payload(const lcm_recv_buf_t* buffer) {
+  return {static_cast<const uint8_t*>(buffer->data), static_cast<uint32_t>(buffer->data_size)};
+}
+
 /// Poses that LCM's library delivered.
 struct Poses {
   std::set<int> places;
@@ -146,6 +151,36 @@ int hear_odometry(const std::string& url) {
   return 0;
 }
 
+/// A line for every command, and for every change of what became of it.
+struct Answers {
+  std::unique_ptr<MessageCodec> codec = make_lcm_codec();
+  uint32_t id = UINT32_MAX;  ///< that nobody uses: the first status is a change
+  CommandResult result = CommandResult::none;
+
+  static void hear(const lcm_recv_buf_t* buffer, const char*, void* self) {
+    StatusMessage s;
+    auto& answers = *static_cast<Answers*>(self);
+    if (answers.codec->decode(payload(buffer), s) != Status::ok) return;
+    if (s.command_id == answers.id && s.command_result == answers.result) return;
+    answers.id = s.command_id, answers.result = s.command_result;
+    std::printf("command %u result %d epoch %u\n", s.command_id, static_cast<int>(s.command_result),
+                s.pose_epoch);
+    std::fflush(stdout);
+  }
+};
+
+int hear_answers(const std::string& url) {
+  lcm_t* lcm = lcm_create(url.c_str());
+  if (!lcm) return 1;
+  Answers answers;
+  lcm_subscribe(lcm, kStatusChannel, Answers::hear, &answers);
+  say_ready();
+  for (Patience patience; patience.goes_on();)
+    if (lcm_handle_timeout(lcm, 50) > 0) patience.something_came();
+  lcm_destroy(lcm);
+  return 0;
+}
+
 /// How long after its capture the datagram of each pose came, and how much of that was not work on its frame.
 class Ages {
  public:
@@ -181,10 +216,6 @@ class Ages {
   static constexpr uint32_t kWarmUp = 10;  ///< the first frame makes the map
   static constexpr size_t kMost = 100000;
 
-  static View<const uint8_t> payload(const lcm_recv_buf_t* buffer) {
-    return {static_cast<const uint8_t*>(buffer->data), static_cast<uint32_t>(buffer->data_size)};
-  }
-
   std::unique_ptr<MessageCodec> codec_ = make_lcm_codec();
   Utime utime_;
   double age_ms_ = 0;
@@ -211,8 +242,9 @@ int probe(int argc, char** argv) {
   if (argc == 3 && mode == "bot-core") return hear_bot_core(argv[2]);
   if (argc == 3 && mode == "commands") return hear_commands(argv[2]);
   if (argc == 3 && mode == "odometry") return hear_odometry(argv[2]);
+  if (argc == 3 && mode == "answers") return hear_answers(argv[2]);
   if (argc == 3 && mode == "ages") return hear_ages(argv[2]);
-  std::fputs("lcm_probe publish|bot-core|commands|odometry|ages URL ...\n", stderr);
+  std::fputs("lcm_probe publish|bot-core|commands|odometry|answers|ages URL ...\n", stderr);
   return 2;
 }
 

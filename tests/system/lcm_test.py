@@ -293,6 +293,54 @@ class Heard(unittest.TestCase):
             self.assertIn("command 9 ", end_of(listener)[1])
 
 
+class Commanded(unittest.TestCase):
+    """A robot, and who tells it what to do on another host."""
+
+    ACCEPTED, DONE, FAILED, REFUSED = 1, 2, 3, 4
+
+    def setUp(self):
+        self.out = pathlib.Path(tempfile.mkdtemp()) / "run"
+        self.addCleanup(shutil.rmtree, self.out.parent, ignore_errors=True)
+        self.robot, self.ground = two_hosts()
+        self.addCleanup(self.ground.__exit__)
+        self.addCleanup(self.robot.__exit__)
+        self.answers = self.ground.probe("answers", URL_OF_NETWORK)
+        self.run_ = self.robot.start(
+            STILLMAP, "run", "--source", "synthetic:static,size=80x60,seconds=600", "--realtime", "--lcm", URL_OF_NETWORK, "--quiet",
+            "--out", self.out, *[f"--set={each}" for each in [
+                "lcm.commands=true", "runtime.threads=1", "map.voxel_m=0.04", "map.truncation_m=0.16", "map.pool_blocks=20000"]])
+
+    def answer(self, number, *results):
+        """Waits until the status says that of the command. @return the epoch of the poses"""
+        deadline, seen = time.monotonic() + PATIENCE_S, []
+        while time.monotonic() < deadline and select.select([self.answers.stdout], [], [], PATIENCE_S)[0]:
+            seen.append(numbers(self.answers.stdout.readline()))
+            if seen[-1]["command"] == number and seen[-1]["result"] in results:
+                return seen[-1]["epoch"]
+        self.fail(f"no {results} for command {number}, but {seen}")
+
+    def tell(self, number, kind, name, *results):
+        send(self.ground, [command(number, kind, name)])
+        return self.answer(number, *results)
+
+    def test_a_map_a_mesh_a_new_map_and_an_end(self):
+        self.answer(0, 0)  # the first status
+        self.tell(1, 1, "hall.smap", self.DONE)
+        saved = (self.out / "hall.smap").stat().st_size
+        self.tell(2, 2, "hall.ply", self.DONE)
+        self.assertTrue((self.out / "hall.ply").read_bytes().startswith(b"ply"))
+        before = self.tell(3, 1, "../outside.smap", self.REFUSED)
+        self.assertFalse((self.out.parent / "outside.smap").exists())
+        self.tell(5, 3, "", self.DONE)
+        self.assertEqual(self.tell(6, 1, "", self.DONE), before + 1)  # poses of a new map
+        send(self.ground, [command(7, 4)])
+        code, text = end_of(self.run_)
+        self.assertEqual(code, 0, text)
+        self.assertGreater(saved, 100000)
+        self.assertGreater((self.out / "map.smap").stat().st_size, 100000)
+        self.assertTrue((self.out / "report.json").exists())
+
+
 class Top(unittest.TestCase):
     LINE = ("mode degraded  tracking poor  30.0 frames/s  {} poses/s  age 12.2 ms  prepare 1.5 track 2.5 mask 3.5 "
             "refine 4.5 integrate 5.5 total 17.5 ms  map 12 % full  dropped 11 frames 12 results  late 13  "
