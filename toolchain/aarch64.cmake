@@ -17,3 +17,7 @@ set(ENV{PKG_CONFIG_SYSROOT_DIR} ${sysroot})
 set(CMAKE_EXE_LINKER_FLAGS_INIT
   "-Wl,-rpath-link,${sysroot}/usr/lib/aarch64-linux-gnu:${sysroot}/lib/aarch64-linux-gnu")
 set(CMAKE_CROSSCOMPILING_EMULATOR qemu-aarch64-static -L ${sysroot})
+# Headers of libraries are looked for after the compiler's own: before them, C's math.h would hide that of C++ with its float
+# functions.
+set(CMAKE_CXX_FLAGS_INIT "-idirafter ${sysroot}/usr/include")
+set(CMAKE_PROJECT_INCLUDE ${CMAKE_CURRENT_LIST_DIR}/aarch64_headers.cmake)

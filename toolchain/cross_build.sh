@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
 # Builds Stillmap for 64-bit ARM (Jetson and the like) on this machine.
 #   cross_build.sh            build/aarch64/stillmap and the .deb for arm64
-#   cross_build.sh --tests    the kernels' unit tests and the parity checks, run under emulation
+#   cross_build.sh --tests    the kernels' unit tests and the parity checks, run under emulation (ten minutes)
+#   cross_build.sh --check    the same tests but for the longest, and those of clocks, checksums and registration (three minutes);
+#                             77: not possible here
 # The system root is unpacked from the distribution's arm64 packages into build/sysroot-arm64; nothing of this system changes but
 # that the compiler and the emulator are installed.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-toolchain/setup.sh --cross
-
 libraries=(
   libc6-dev libstdc++6 libeigen3-dev libfmt-dev libcli11-dev nlohmann-json3-dev libtomlplusplus-dev libnanoflann-dev
   libspng-dev libsystemd-dev libturbojpeg0-dev libzstd-dev libcairo2-dev libgpiod-dev libopenni2-dev liblcm-dev libgtest-dev
@@ -55,8 +55,45 @@ make_sysroot() {
 }
 configure() { cmake --preset aarch64 -DSTILLMAP_BUILD_TESTS="$1" >/dev/null; }
 
-make_sysroot
+# Unit tests that take ten seconds and more under emulation.
+slow=(
+  CpuEngine.BothFormsOfFreeSpaceKnowTheSameAndOneTakesAFractionOfTheMemory CpuEngine.WhatHasToLastIsCountedInSeconds
+  CpuEngine.TheSameBitsWithOneTwoAndFourThreads CpuEngine.WhatWasStaticAndIsTakenAwayIsCarved
+  CpuEngine.TheWallStaysWhenTheBoxHasGoneThrough CpuEngine.ABoxThatCameAndStaysIsStaticAndMapped
+  VisibleBlocks.EveryVoxelThatIsSeenLiesInAListedBlockAndFreeBlocksAreFree RayRanges.SkippingFreeSpaceDoesNotChangeThePicture
+)
+# The quick ones, one part for each processor.
+run_quick_tests() {
+  local shards index failed=0 parts=()
+  shards=$(nproc)
+  for ((index = 0; index < shards; ++index)); do
+    GTEST_TOTAL_SHARDS=$shards GTEST_SHARD_INDEX=$index GTEST_BRIEF=1 GTEST_FILTER=-$(IFS=:; echo "${slow[*]}") \
+      timeout 600 qemu-aarch64-static -L "$sysroot" build/aarch64/test_kernels &
+    parts+=($!)
+  done
+  for part in "${parts[@]}"; do wait "$part" || failed=1; done
+  for program in test_core test_camera; do  # one of them holds its time against a bound
+    GTEST_BRIEF=1 GTEST_FILTER=-*TakesASmallShare* timeout 600 qemu-aarch64-static -L "$sysroot" build/aarch64/$program || failed=1
+  done
+  return $failed
+}
+prepare() {
+  toolchain/setup.sh --cross
+  make_sysroot
+}
+
+if [[ ${1:-} == --check ]]; then
+  prepare & wait $! ||
+    { echo "cross_build.sh: skipped: the compiler or the libraries for arm64 are not to be had here" >&2; exit 77; }
+else
+  prepare
+fi
 case "${1:-}" in
+  --check)
+    configure ON
+    cmake --build build/aarch64 -j "$(nproc)" --target test_kernels test_core test_camera
+    run_quick_tests
+    ;;
   '')
     configure OFF
     cmake --build build/aarch64 -j "$(nproc)" --target stillmap
@@ -69,5 +106,5 @@ case "${1:-}" in
     ctest --test-dir build/aarch64 --output-on-failure -j "$(nproc)" -R '^test_(kernels|extract)$'
     qemu-aarch64-static -L "$sysroot" build/aarch64/stillmap_parity --frames 12  # emulated it is slow
     ;;
-  *) echo "cross_build.sh: unknown argument '$1'; only --tests is known" >&2; exit 2 ;;
+  *) echo "cross_build.sh: unknown argument '$1'; only --tests and --check are known" >&2; exit 2 ;;
 esac
