@@ -92,11 +92,14 @@ class MeshSums : public MeshSink {
     return std::max({relative(vertices_, other.vertices_), relative(triangles_, other.triangles_),
                      relative(area_m2_, other.area_m2_)});
   }
-  double centre_distance_m(const MeshSums& other) const { return norm(centre() - other.centre()); }
+  /// Of the centres of all vertices. Nothing is multiplied before equal sums are subtracted: fused into one
+  /// operation, as on ARM, that would leave the rounding of one of the products.
+  double centre_distance_m(const MeshSums& other) const {
+    const double n = std::max(vertices_, 1.0), m = std::max(other.vertices_, 1.0);
+    return n == m ? norm(sum_ - other.sum_) / n : norm((1.0 / n) * sum_ - (1.0 / m) * other.sum_);
+  }
 
  private:
-  Vec3d centre() const { return (1.0 / std::max(vertices_, 1.0)) * sum_; }
-
   double vertices_ = 0, triangles_ = 0, area_m2_ = 0;
   Vec3d sum_;
   std::vector<Vec3d> positions_;
