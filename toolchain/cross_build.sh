@@ -2,12 +2,13 @@
 # Builds Stillmap for 64-bit ARM (Jetson and the like) on this machine.
 #   cross_build.sh            build/aarch64/stillmap and the .deb for arm64
 #   cross_build.sh --tests    the kernels' unit tests and the parity checks, run under emulation (ten minutes)
-#   cross_build.sh --check    the same tests but for the longest, and those of clocks, checksums and registration (three minutes);
-#                             77: not possible here
+#   cross_build.sh --check    the kernels' unit tests but for the longest, and those of runtime/core and drivers/camera (three
+#                             minutes); 77: not possible here
 # The system root is unpacked from the distribution's arm64 packages into build/sysroot-arm64; nothing of this system changes but
 # that the compiler and the emulator are installed.
 set -euo pipefail
 cd "$(dirname "$0")/.."
+
 libraries=(
   libc6-dev libstdc++6 libeigen3-dev libfmt-dev libcli11-dev nlohmann-json3-dev libtomlplusplus-dev libnanoflann-dev
   libspng-dev libsystemd-dev libturbojpeg0-dev libzstd-dev libcairo2-dev libgpiod-dev libopenni2-dev liblcm-dev libgtest-dev

@@ -18,6 +18,7 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <initializer_list>
 #include <memory>
 #include <set>
 #include <string>
@@ -82,6 +83,23 @@ int publish(const std::string& url, int count, double hz) {
   return 0;
 }
 
+struct Subscription {
+  const char* channel;
+  lcm_msg_handler_t hear;
+};
+
+/// By LCM's library. @return false: it cannot
+bool listen(const std::string& url, std::initializer_list<Subscription> subscriptions, void* self) {
+  lcm_t* lcm = lcm_create(url.c_str());
+  if (!lcm) return false;
+  for (const Subscription& each : subscriptions) lcm_subscribe(lcm, each.channel, each.hear, self);
+  say_ready();
+  for (Patience patience; patience.goes_on();)
+    if (lcm_handle_timeout(lcm, 50) > 0) patience.something_came();
+  lcm_destroy(lcm);
+  return true;
+}
+
 View<const uint8_t> payload(const lcm_recv_buf_t* buffer) {
   return {static_cast<const uint8_t*>(buffer->data), static_cast<uint32_t>(buffer->data_size)};
 }
@@ -106,14 +124,8 @@ struct Poses {
 };
 
 int hear_bot_core(const std::string& url) {
-  lcm_t* lcm = lcm_create(url.c_str());
-  if (!lcm) return 1;
   Poses poses;
-  lcm_subscribe(lcm, kPoseChannel, Poses::hear, &poses);
-  say_ready();
-  for (Patience patience; patience.goes_on();)
-    if (lcm_handle_timeout(lcm, 50) > 0) patience.something_came();
-  lcm_destroy(lcm);
+  if (!listen(url, {{kPoseChannel, Poses::hear}}, &poses)) return 1;
   std::printf("poses %zu first %d last %d wrong %d\n", poses.places.size(),
               poses.places.empty() ? -1 : *poses.places.begin(),
               poses.places.empty() ? -1 : *poses.places.rbegin(), poses.wrong);
@@ -170,15 +182,8 @@ struct Answers {
 };
 
 int hear_answers(const std::string& url) {
-  lcm_t* lcm = lcm_create(url.c_str());
-  if (!lcm) return 1;
   Answers answers;
-  lcm_subscribe(lcm, kStatusChannel, Answers::hear, &answers);
-  say_ready();
-  for (Patience patience; patience.goes_on();)
-    if (lcm_handle_timeout(lcm, 50) > 0) patience.something_came();
-  lcm_destroy(lcm);
-  return 0;
+  return listen(url, {{kStatusChannel, Answers::hear}}, &answers) ? 0 : 1;
 }
 
 /// How long after its capture the datagram of each pose came, and how much of that was not work on its frame.
@@ -223,15 +228,8 @@ class Ages {
 };
 
 int hear_ages(const std::string& url) {
-  lcm_t* lcm = lcm_create(url.c_str());
-  if (!lcm) return 1;
   Ages ages;
-  lcm_subscribe(lcm, kPoseChannel, Ages::hear_pose, &ages);
-  lcm_subscribe(lcm, kStatusChannel, Ages::hear_status, &ages);
-  say_ready();
-  for (Patience patience; patience.goes_on();)
-    if (lcm_handle_timeout(lcm, 50) > 0) patience.something_came();
-  lcm_destroy(lcm);
+  if (!listen(url, {{kPoseChannel, Ages::hear_pose}, {kStatusChannel, Ages::hear_status}}, &ages)) return 1;
   ages.print();
   return 0;
 }
